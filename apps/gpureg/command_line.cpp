@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "command_line.hpp"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
@@ -30,6 +32,11 @@ std::string list_of_verbs(const CLI::App& app) {
   return list;
 }
 
+/// By one argument; of a pattern without quotes, the shell makes many.
+bool takes_scans(const std::string& verb) {
+  return verb == "batch" || verb == "reconstruct" || verb == "calibrate" || verb == "audit";
+}
+
 // CLI11's own words for a misspelt verb or option do not always name it.
 std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int argc,
                           char** argv) {
@@ -45,8 +52,12 @@ std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int
     return error.what() + help;
   const auto option = std::find_if(unknown.begin(), unknown.end(),
                                    [](const std::string& text) { return text.rfind("-", 0) == 0; });
-  return option == unknown.end() ? "unexpected argument " + unknown.front() + help
-                                 : "unknown option " + *option + help;
+  if (option != unknown.end()) return "unknown option " + *option + help;
+  return "unexpected argument " + unknown.front() +
+         (takes_scans(chosen.front()->get_name()) && ::access(unknown.front().c_str(), F_OK) == 0
+              ? ": several scans are a folder, a list, or a pattern in quotes, 'scans/*.ply'"
+              : "") +
+         help;
 }
 
 }  // namespace

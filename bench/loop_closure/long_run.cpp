@@ -55,8 +55,8 @@ struct Stop {
 std::vector<Stop> read_stops(const std::string& folder) {
   const auto poses = read_poses(folder + "/poses.txt");
   std::vector<Stop> stops;
-  for (const auto& [number, file] : io::list_fragments(folder))
-    stops.push_back({io::read_point_cloud(file), poses.at(number)});
+  for (const io::ScanFile& scan : io::list_scans(folder))
+    stops.push_back({io::read_point_cloud(scan.path), poses.at(scan.number)});
   if (stops.size() < 2) throw IoError(folder + " has fewer than two fragments");
   return stops;
 }

@@ -47,9 +47,9 @@ def write(folder, output):
 
     folder, output = pathlib.Path(folder), pathlib.Path(output)
     cameras = folder / "cameras.txt"
-    viewpoints = _core.read_cameras(str(cameras)) if cameras.exists() else {}
+    viewpoints = _core.read_cameras(str(cameras), [], []) if cameras.exists() else {}
     numbers = []
-    for number, path in _core.list_fragments(str(folder)):
+    for number, path, _ in _core.list_scans(str(folder), False)[0]:
         cloud = gpureg.read_point_cloud(path)
         normals = cloud.normals if cloud.normals is not None and len(cloud.normals) else None
         write_one(output, number, cloud.points, normals, viewpoints.get(number))

@@ -22,9 +22,9 @@ const std::vector<PointCloud>& fragments() {
                       cameras = folder + "/cameras.txt";
     std::map<int, std::vector<Eigen::Vector3d>> viewpoints;
     if (std::ifstream(cameras)) viewpoints = io::read_cameras(cameras);
-    for (const auto& [number, file] : io::list_fragments(folder)) {
-      out.push_back(io::read_point_cloud(file));
-      if (viewpoints.count(number) > 0) out.back().set_viewpoints(viewpoints[number]);
+    for (const io::ScanFile& scan : io::list_scans(folder)) {
+      out.push_back(io::read_point_cloud(scan.path));
+      if (viewpoints.count(scan.number) > 0) out.back().set_viewpoints(viewpoints[scan.number]);
     }
     return out;
   }();

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -74,19 +75,56 @@ std::string coarse_coordinates(const PointCloud& cloud);
 /// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.
 void write_point_cloud(const std::string& path, const PointCloud& cloud);
 
-/// Lists cloud_bin_<i>.ply|pcd|bin|stl|obj of a folder.
-/// @return number and path, ascending by number.
-/// @throws IoError where the folder has none, or a number twice.
-std::vector<std::pair<int, std::string>> list_fragments(const std::string& folder);
+/// One scan of a folder, a list or a file.
+struct ScanFile {
+  int number = 0;    ///< what files of results call it; see list_scans()
+  std::string path;  ///< as read_point_cloud() takes it: "a.e57#2" of a file with several scans
+  std::string name;  ///< for people: of the file, or what a list calls it; unique
+};
+
+/// Lists the scans of
+/// - a folder: its files cloud_bin_<i> with their numbers, and where it has none, all its clouds
+/// and
+///   meshes in natural order (scan2 before scan10) but for hidden files. Names that differ by a
+///   number alone keep it (scan_12.ply is 12); else numbers count from 0. Of a file with several
+///   scans each is one, "a.e57#2". Recursive: clouds of subfolders too, whose names have the
+///   path.
+/// - a pattern, as "scans/*.ply" or "scans/**/*.pcd", likewise.
+/// - a list: a text file with one path a line, relative to its folder, and perhaps a name after it;
+///   lines that begin with # are comments. Numbers count the lines from 0.
+/// - a file with several scans.
+/// @param notes receives sentences about what was skipped; may be null.
+/// @return ascending by number.
+/// @throws IoError saying what was found instead and what to do: no cloud, a number or a scan
+/// twice,
+///   a missing file of a list.
+std::vector<ScanFile> list_scans(const std::string& path, bool recursive = false,
+                                 std::vector<std::string>* notes = nullptr);
+
+/// Whether a path names several scans as list_scans() takes them: a folder, a pattern, or a list,
+/// which is a text whose first rows are no points. A file with several scans is none of these.
+bool names_scans(const std::string& path);
+
+/// Folder of such a path, where files beside the scans are: cameras.txt, poses.txt.
+std::string folder_of_scans(const std::string& path);
+
+/// Place of the scan that a word of a text file means: digits are a number; else its name, with or
+/// without folder and extension, where no other scan has it too. None: there is no such scan.
+std::optional<std::size_t> find_scan(const std::vector<ScanFile>& scans, std::string_view word);
 
 /// Reads cameras.txt: lines `fragment frame tx ty tz qx qy qz qw` (fragment_from_camera); '#'
 /// starts a comment.
-/// @return camera positions of each fragment, metres, in the order of the file.
+/// @param scans of which a fragment is one, by number or name, see find_scan(); empty: numbers
+/// alone.
+/// @return camera positions of each fragment by number, metres, in the order of the file.
 /// @throws IoError naming file and line.
-std::map<int, std::vector<Eigen::Vector3d>> read_cameras(const std::string& path);
+std::map<int, std::vector<Eigen::Vector3d>> read_cameras(const std::string& path,
+                                                         const std::vector<ScanFile>& scans = {});
 
 /// Reads pairs: one `i j` per line, i != j; '#' starts a comment.
+/// @param scans as for read_cameras().
 /// @throws IoError naming file and line.
-std::vector<std::pair<int, int>> read_pairs(const std::string& path);
+std::vector<std::pair<int, int>> read_pairs(const std::string& path,
+                                            const std::vector<ScanFile>& scans = {});
 
 }  // namespace gpureg::io

@@ -21,7 +21,9 @@ import gpureg
 def overhead(arguments: argparse.Namespace) -> None:
     options = gpureg.RegistrationOptions.loopsmart()
     options.quadruples.count = arguments.quadruples
-    clouds = [gpureg.prepare(path) for _, path in gpureg._core.list_fragments(arguments.folder)]
+    clouds = [
+        gpureg.prepare(scan[1]) for scan in gpureg._core.list_scans(arguments.folder, False)[0]
+    ]
     pairs = [(j, i) for i in range(len(clouds)) for j in range(i + 1, len(clouds))]
     reference = subprocess.Popen(
         [arguments.reference, arguments.folder, str(arguments.quadruples)],
@@ -63,7 +65,7 @@ def scaling(arguments: argparse.Namespace) -> None:
     """The same work by one thread and by n, each with a context of one CPU thread."""
     options = gpureg.RegistrationOptions.loopsmart()
     options.quadruples.count = arguments.quadruples
-    paths = [path for _, path in gpureg._core.list_fragments(arguments.folder)[:2]]
+    paths = [scan[1] for scan in gpureg._core.list_scans(arguments.folder, False)[0][:2]]
     contexts = [gpureg.Context.cpu(1) for _ in range(arguments.threads)]
     a, b = (gpureg.prepare(path, context=contexts[0]) for path in paths)
     results: list[list[float]] = [[] for _ in contexts]

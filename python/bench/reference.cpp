@@ -16,8 +16,8 @@ int main(int argc, char** argv) {
   auto options = gpureg::RegistrationOptions::loopsmart();
   options.quadruples.count = static_cast<std::uint32_t>(std::strtoul(argv[2], nullptr, 10));
   std::vector<gpureg::PreparedCloud> clouds;
-  for (const auto& [number, path] : gpureg::io::list_fragments(argv[1]))
-    clouds.push_back(gpureg::prepare(context, gpureg::io::read_point_cloud(path).view()));
+  for (const gpureg::io::ScanFile& scan : gpureg::io::list_scans(argv[1]))
+    clouds.push_back(gpureg::prepare(context, gpureg::io::read_point_cloud(scan.path).view()));
   std::vector<gpureg::Pair> pairs;
   for (std::uint32_t i = 0; i < clouds.size(); ++i)
     for (std::uint32_t j = i + 1; j < clouds.size(); ++j) pairs.push_back({j, i});

@@ -12,6 +12,7 @@
 #include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
 #include "matrix.hpp"
+#include "scans.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -25,6 +26,12 @@ std::vector<Eigen::Vector3f> vectors_of(const py::object& array, const char* nam
   const Rows rows = rows_of(array.cast<FloatArray>(), name);
   for (std::size_t k = 0; k < rows.count; ++k) out.emplace_back(rows.data + k * rows.stride);
   return out;
+}
+
+/// A path may hold bytes that are no text.
+py::str path_of(const std::string& path) {
+  return py::reinterpret_steal<py::str>(
+      PyUnicode_DecodeFSDefaultAndSize(path.data(), static_cast<py::ssize_t>(path.size())));
 }
 
 void warn(const std::string& path, const std::string& what) {
@@ -137,12 +144,36 @@ void bind_files(py::module_& m) {
       },
       py::arg("vertices"), py::arg("faces"), py::arg("spacing"));
   m.def("write_point_cloud", &io::write_point_cloud, py::arg("path"), py::arg("cloud"), release());
-  m.def("list_fragments", &io::list_fragments, py::arg("folder"), release());
+  m.def(
+      "list_scans",
+      [](const std::string& path, bool recursive) {
+        std::vector<std::string> notes;
+        std::vector<io::ScanFile> scans;
+        {
+          const py::gil_scoped_release unlocked;
+          scans = io::list_scans(path, recursive, &notes);
+        }
+        py::list out;
+        for (const io::ScanFile& scan : scans)
+          out.append(py::make_tuple(scan.number, path_of(scan.path), scan.name));
+        return py::make_tuple(out, notes);
+      },
+      py::arg("path"), py::arg("recursive"));
+  m.def("names_scans", &io::names_scans, py::arg("path"), release());
+  m.def(
+      "folder_of_scans", [](const std::string& path) { return path_of(io::folder_of_scans(path)); },
+      py::arg("path"));
+  m.def(
+      "find_scan",
+      [](const std::vector<int>& numbers, const std::vector<std::string>& names,
+         const std::string& word) { return io::find_scan(scans_of(numbers, names), word); },
+      py::arg("numbers"), py::arg("names"), py::arg("word"));
   m.def(
       "read_cameras",
-      [](const std::string& path) {
+      [](const std::string& path, const std::vector<int>& numbers,
+         const std::vector<std::string>& names) {
         py::dict out;
-        for (const auto& [number, positions] : io::read_cameras(path)) {
+        for (const auto& [number, positions] : io::read_cameras(path, scans_of(numbers, names))) {
           Eigen::Matrix<double, Eigen::Dynamic, 3> rows(positions.size(), 3);
           for (std::size_t k = 0; k < positions.size(); ++k)
             rows.row(static_cast<Eigen::Index>(k)) = positions[k].transpose();
@@ -150,14 +181,13 @@ void bind_files(py::module_& m) {
         }
         return out;
       },
-      py::arg("path"));
+      py::arg("path"), py::arg("numbers"), py::arg("names"));
   m.def(
       "write_text",
       [](const std::string& path, const std::string& content) {
         files::write_atomically(path, content);
       },
       py::arg("path"), py::arg("content"), release());
-  m.def("read_pairs", &io::read_pairs, py::arg("path"), release());
 }
 
 }  // namespace gpureg::python

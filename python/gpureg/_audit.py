@@ -189,12 +189,12 @@ def audit(
 
     Parameters
     ----------
-    fragments : FragmentSet, folder, or sequence of clouds
+    fragments : FragmentSet, path as for `FragmentSet.from_directory`, or sequence of clouds
     poses : Map, path, or (N, 4, 4) array
         A `Map`, or the output folder of ``gpureg reconstruct``: island by island. Of one frame:
         ``world_from_scan`` of each fragment, NaN if it has none; or a file, as for
-        ``gpureg audit``: a trajectory (TUM with fragment numbers as times, KITTI, or poses.txt), g2o, or a
-        Redwood log of scans or of pairs.
+        ``gpureg audit``: a trajectory (TUM with numbers or names of fragments as times, KITTI, or
+        poses.txt), g2o, or a Redwood log of scans or of pairs.
     options : RegistrationOptions, optional
     audit_options : AuditOptions, optional
         Default: those of the voxel size.
@@ -343,29 +343,35 @@ def _map_of(poses: Any, fragments: FragmentSet) -> tuple[Poses, list[int]]:
         return matrices, one
     path = os.fspath(poses)
     if not (os.path.isdir(path) or path.endswith(".json")):
-        return _core.read_pose_file(path, list(fragments.numbers), "fragments")
+        return _core.read_pose_file(path, fragments.numbers, fragments.names, "fragments")
     matrices = np.full((len(fragments), 4, 4), np.nan)
-    positions = {int(number): k for k, number in enumerate(fragments.numbers)}
-    islands = _read_map(path, positions, matrices)
+    islands = _read_map(path, fragments, matrices)
     if np.isfinite(matrices[:, 0, 0]).sum() < 2:
         raise ValueError(f"poses: {path} holds no poses of two fragments")
     return matrices, islands
 
 
-def _read_map(path: str, positions: dict[int, int], matrices: Poses) -> list[int]:
-    """Fills in the poses of a reconstruction.json, and returns the island of each fragment."""
+def _read_map(path: str, fragments: FragmentSet, matrices: Poses) -> list[int]:
+    """Fills in the poses of a reconstruction.json, and returns the island of each fragment. Names
+    count before numbers, which are places where files came and went.
+    """
     file = os.path.join(path, "reconstruction.json") if os.path.isdir(path) else path
     if not os.path.exists(file):
         raise ValueError(
             f"poses: there is no {file}, which `gpureg reconstruct` writes when all else is there"
         )
-    islands = [0] * len(positions)
+    islands = [0] * len(fragments)
     counted: dict[int, int] = {}  # islands without a fragment here do not count
     try:
         with open(file, encoding="utf-8") as text:
             scans = json.load(text)["scans"]
+        known: tuple[Any, ...] = fragments.names
+        key = "name"
+        if not set(known) & {scan.get(key) for scan in scans}:
+            known, key = fragments.numbers, "id"
+        positions = {name: k for k, name in enumerate(known)}
         for scan in scans:
-            k = positions.get(scan["id"])
+            k = positions.get(scan[key])
             if k is None or scan["island"] is None:
                 continue
             matrices[k] = np.reshape(scan["island_from_scan"], (4, 4))

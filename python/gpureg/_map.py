@@ -28,6 +28,8 @@ class MapScan:
     ----------
     number : int
         Of the fragment.
+    name : str
+        Of its file, see `FragmentSet.names`.
     placed : bool
     island : int or None
         Index into ``Map.islands``; None if the scan is left out.
@@ -42,6 +44,7 @@ class MapScan:
     """
 
     number: int
+    name: str
     placed: bool
     island: int | None
     confidence: float
@@ -125,10 +128,10 @@ class Map:
         numbers = fragments.numbers
         scans = iter(graph.scans)
         self._scans = tuple(
-            MapScan(number, False, None, 0.0, "unusable", unusable[k])
+            MapScan(number, name, False, None, 0.0, "unusable", unusable[k])
             if k in unusable
-            else MapScan(number, *next(scans))
-            for k, number in enumerate(of.numbers)
+            else MapScan(number, name, *next(scans))
+            for k, (number, name) in enumerate(zip(of.numbers, of.names))
         )
         self._edges = tuple(
             MapEdge(numbers[edge[0]], numbers[edge[1]], *edge[2:]) for edge in graph.edges
@@ -155,6 +158,11 @@ class Map:
     def numbers(self) -> tuple[int, ...]:
         """Numbers of the fragments, in the order of ``poses`` and ``scans``."""
         return self._of.numbers
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the fragments, in the same order."""
+        return self._of.names
 
     @property
     def scans(self) -> tuple[MapScan, ...]:

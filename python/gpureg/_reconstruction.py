@@ -47,7 +47,8 @@ def reconstruct(
 
     Parameters
     ----------
-    fragments : FragmentSet, folder, or sequence of clouds
+    fragments : FragmentSet, path, or sequence of clouds
+        A path as for `FragmentSet.from_directory`: a folder, a pattern, a list.
     pairs : "all", list of pairs, (M, 2) array, or callable, optional
         Pairs of fragment numbers that are aligned, see `FragmentSet.choose_pairs`; default "all",
         and `gpureg.pruning.Nearest` for large sets. With a sequence as results: rows (source,
@@ -56,10 +57,10 @@ def reconstruct(
         Instead of aligning: one result per pair, or what `register_all` returned. The table of a
         `register_all` keeps the best pose of a pair only, so that other modes take no part.
     odometry : path, (N, 4, 4) array, or sequence, optional
-        Known poses: a trajectory file (TUM with fragment numbers as times, or poses.txt),
+        Known poses: a trajectory file (TUM with numbers or names as times, or poses.txt),
         ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
-        count, a Redwood log of pairs, or tuples (source, target, target_from_source) of fragment numbers, with a 6x6
-        information matrix as a fourth entry if it is known.
+        count, a Redwood log of pairs, or tuples (source, target, target_from_source) of fragment
+        numbers, with a 6x6 information matrix as a fourth entry if it is known.
     audit : bool
         Ask the scans whether they contradict each other where the map puts them, and take edges
         out that cannot be right. Clouds are needed, and prepared if `results` are given.
@@ -219,7 +220,7 @@ def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
     if odometry is None:
         return []
     if isinstance(odometry, str | os.PathLike):
-        return _from_file(odometry, fragments.numbers)
+        return _from_file(odometry, fragments)
     if hasattr(odometry, "shape"):
         poses = float64(odometry, "odometry")
         if poses.shape != (len(fragments), 4, 4):
@@ -239,10 +240,12 @@ def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
 
 
 def _from_file(
-    path: str | os.PathLike[str], numbers: Sequence[int], unusable: Sequence[int] = ()
+    path: str | os.PathLike[str], scans: FragmentSet, unusable: Sequence[int] = ()
 ) -> list[Any]:
     return list(
-        _core.read_odometry(os.fspath(path), list(numbers), "the set of fragments", list(unusable))
+        _core.read_odometry(
+            os.fspath(path), scans.numbers, scans.names, "the set of fragments", list(unusable)
+        )
     )
 
 
@@ -252,9 +255,7 @@ def _odometry_of_others(
     """known: `_odometry` of the whole set."""
     kept = [k for k in range(len(of)) if k not in unusable]
     if isinstance(odometry, str | os.PathLike):
-        return _from_file(
-            odometry, [of.numbers[k] for k in kept], [of.numbers[k] for k in unusable]
-        )
+        return _from_file(odometry, of.without(unusable), [of.numbers[k] for k in unusable])
     if isinstance(known, np.ndarray):
         return known[kept]
     places = {k: place for place, k in enumerate(kept)}

@@ -70,7 +70,9 @@ class BatchRun:
 
     @property
     def parquet(self) -> Path:
-        """One row per pair, in tiles of 64 x 64 fragments."""
+        """One row per pair, in tiles of 64 x 64 fragments; ``name_i`` and ``name_j`` say which files
+        the numbers ``i`` and ``j`` are.
+        """
         return self.folder / "results.parquet"
 
     def table(self) -> pa.Table:
@@ -114,12 +116,12 @@ def register_all(
     Chunks of pairs are written as they finish. A run that was killed, or stopped by Ctrl-C, goes on
     when the same call is made again; the files in the end are, byte for byte, those of an
     uninterrupted run, on any number of devices. A fragment that cannot be read or prepared costs its
-    own pairs, and is named in the result; once it is repaired or removed, the same call does what is
-    missing.
+    own pairs, and is named in the result; once it is repaired, or removed where the numbers of the
+    others stay, the same call does what is missing.
 
     Parameters
     ----------
-    fragments : FragmentSet, folder, or sequence of clouds
+    fragments : FragmentSet, path as for `FragmentSet.from_directory`, or sequence of clouds
     pairs : "all", list of pairs, (M, 2) array, or callable
         Pairs of fragment numbers, see `FragmentSet.choose_pairs`; `gpureg.pruning.Nearest` for
         large sets.

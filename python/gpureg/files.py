@@ -121,7 +121,7 @@ def read_cameras(path: Path) -> dict[int, npt.NDArray[np.float64]]:
     IoError
         Naming file and line.
     """
-    return _core.read_cameras(os.fspath(path))
+    return _core.read_cameras(os.fsencode(path), [], [])
 
 
 def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import warnings
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import CoreCloud, core_cloud, several, to_numpy
 from ._core import IoError, PrepareOptions
-from .files import read_cameras
 
 _PIECE = 1 << 20  # bytes of a file that are in memory while its fingerprint is made
 
@@ -38,6 +38,7 @@ class FragmentSet:
         numbers: Sequence[int],
         sources: Sequence[Any],
         viewpoints: dict[int, Any] | None = None,
+        names: Sequence[str] | None = None,
     ) -> None:
         if len(set(numbers)) != len(numbers):
             raise ValueError("numbers: one is there twice")
@@ -46,29 +47,66 @@ class FragmentSet:
         self._numbers = tuple(int(number) for number in numbers)
         self._sources = tuple(sources)
         self._viewpoints = viewpoints or {}
+        self._names = tuple(_names_of(self._numbers, sources) if names is None else names)
+        if len(self._names) != len(self._numbers):
+            raise ValueError(f"names: {len(self._names)} for {len(self._numbers)} fragments")
 
     @classmethod
-    def from_directory(cls, directory: str | os.PathLike[str]) -> FragmentSet:
-        """The files ``cloud_bin_<i>.ply|pcd|bin|stl|obj`` of a folder, with sensor positions from its
-        cameras.txt if it has one.
+    def from_directory(
+        cls, directory: str | os.PathLike[str], recursive: bool = False
+    ) -> FragmentSet:
+        """The clouds and meshes of a folder, with sensor positions from its cameras.txt if it has
+        one.
+
+        Parameters
+        ----------
+        directory : path
+            A folder: its files ``cloud_bin_<i>`` with their numbers, and where it has none, all its
+            clouds in natural order (scan2 before scan10). Names that differ by a number alone keep
+            it (scan_12.ply is 12); else numbers count from 0. Or a pattern (``"scans/*.ply"``,
+            ``"scans/**/*.ply"``), or a text file with one path a line, relative to its folder, and
+            perhaps a name after it.
+        recursive : bool
+            Also the clouds of all subfolders, whose names have the path.
+
+        Warns
+        -----
+        UserWarning
+            About files that are no clouds, and links to nothing.
 
         Raises
         ------
         IoError
-            Where there is no fragment, or a number is twice.
+            Saying what the folder holds instead of clouds; where a scan or a number is there twice.
+
+        Examples
+        --------
+        >>> import gpureg, tempfile, os
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     for name in ("hall.ply", "stairs 10.ply", "stairs 9.ply"):
+        ...         gpureg.write_point_cloud(os.path.join(folder, name), [[0, 0, 0]])
+        ...     scans = gpureg.FragmentSet.from_directory(folder)
+        >>> scans.names
+        ('hall.ply', 'stairs 9.ply', 'stairs 10.ply')
         """
-        found = _core.list_fragments(os.fspath(directory))
-        cameras = Path(directory) / "cameras.txt"
-        viewpoints: dict[int, Any] = read_cameras(cameras) if cameras.exists() else {}
-        return cls([number for number, _ in found], [path for _, path in found], viewpoints)
+        path = os.fsencode(directory)
+        found, notes = _core.list_scans(path, bool(recursive))
+        for note in notes:
+            warnings.warn(note, stacklevel=2)
+        numbers, names = [scan[0] for scan in found], [scan[2] for scan in found]
+        cameras = Path(_core.folder_of_scans(path)) / "cameras.txt"
+        viewpoints: dict[int, Any] = (
+            _core.read_cameras(os.fsencode(cameras), numbers, names) if cameras.exists() else {}
+        )
+        return cls(numbers, [scan[1] for scan in found], viewpoints, names)
 
     @classmethod
-    def from_clouds(cls, clouds: Sequence[Any]) -> FragmentSet:
+    def from_clouds(cls, clouds: Sequence[Any], names: Sequence[str] | None = None) -> FragmentSet:
         """Clouds in memory, or paths: whatever `prepare` takes as points. Their numbers are 0, 1,
-        2, ...
+        2, ...; their names, unless given, those of files, and else the numbers.
         """
         clouds = several(clouds, "clouds")
-        return cls(range(len(clouds)), clouds)
+        return cls(range(len(clouds)), clouds, None, names)
 
     def __len__(self) -> int:
         return len(self._numbers)
@@ -82,6 +120,11 @@ class FragmentSet:
         return self._numbers
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Of each fragment, for people: the name of its file, or what a list calls it."""
+        return self._names
+
+    @property
     def count(self) -> int:
         """What Redwood's files give as the number of fragments: one more than the largest number."""
         return self._numbers[-1] + 1 if self._numbers else 0
@@ -90,7 +133,10 @@ class FragmentSet:
         """The others, under their numbers."""
         kept = [k for k in range(len(self)) if k not in positions]
         return FragmentSet(
-            [self._numbers[k] for k in kept], [self._sources[k] for k in kept], self._viewpoints
+            [self._numbers[k] for k in kept],
+            [self._sources[k] for k in kept],
+            self._viewpoints,
+            [self._names[k] for k in kept],
         )
 
     def load(self, position: int, options: PrepareOptions, device: bool = False) -> CoreCloud:
@@ -151,8 +197,8 @@ class FragmentSet:
         Parameters
         ----------
         pairs : "all", list of pairs, (M, 2) array, or callable
-            Pairs of fragment numbers, in either order; repetitions count once. A callable gets this
-            set and returns them.
+            Pairs of fragment numbers, or of names, in either order; repetitions count once. A
+            callable gets this set and returns them.
 
         Examples
         --------
@@ -171,7 +217,9 @@ class FragmentSet:
             return np.stack(np.triu_indices(len(self), 1), axis=1)
         if callable(pairs):
             pairs = pairs(self)
-        chosen = to_numpy(pairs if hasattr(pairs, "shape") else list(pairs), "pairs")
+        chosen = to_numpy(
+            pairs if hasattr(pairs, "shape") else [self._numbered(pair) for pair in pairs], "pairs"
+        )
         if chosen.size == 0:
             return np.zeros((0, 2), np.int64)
         if chosen.dtype.kind not in "iu" or chosen.ndim != 2 or chosen.shape[1] != 2:
@@ -189,6 +237,29 @@ class FragmentSet:
             raise ValueError(f"pairs: {chosen[same][0].tolist()} is a fragment and itself")
         _, first = np.unique(positions, axis=0, return_index=True)
         return np.asarray(positions[np.sort(first)], np.int64)
+
+    def _numbered(self, pair: Any) -> Any:
+        """A pair with numbers in place of names."""
+        if isinstance(pair, str) or not hasattr(pair, "__iter__"):
+            return pair
+        return [self._number(word) if isinstance(word, str) else word for word in pair]
+
+    def _number(self, word: str) -> int:
+        place = _core.find_scan(self._numbers, self._names, word)
+        if place is None:
+            raise ValueError(f"pairs: there is no fragment named {word!r}")
+        return self._numbers[place]
+
+
+def _names_of(numbers: Sequence[int], sources: Sequence[Any]) -> list[str]:
+    """Names of files without their folders, where they differ; else numbers."""
+    names = [
+        os.path.basename(os.fspath(source))
+        if isinstance(source, str | os.PathLike)
+        else str(number)
+        for number, source in zip(numbers, sources)
+    ]
+    return names if len(set(names)) == len(names) else [str(number) for number in numbers]
 
 
 def _file_of(path: str | os.PathLike[str]) -> str:

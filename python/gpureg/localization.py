@@ -29,7 +29,7 @@ from .fragments import FragmentSet
 
 
 def _set_of(scans: Any, name: str) -> FragmentSet | list[Any]:
-    if isinstance(scans, str | os.PathLike) and os.path.isdir(scans):
+    if isinstance(scans, str | os.PathLike) and _core.names_scans(os.fsencode(scans)):
         return FragmentSet.from_directory(scans)
     return scans if isinstance(scans, FragmentSet) else several(scans, name)
 
@@ -129,7 +129,7 @@ def locate_batch(
 ) -> list[LocateResult]:
     """`locate` for many scans at once: the same results, and each tile is prepared once.
 
-    scans: a sequence, a folder of fragments, or a `FragmentSet`.
+    scans: a sequence, a path as for `FragmentSet.from_directory`, or a `FragmentSet`.
     """
     map = checked(map, PreparedMap, "map")
     voxel_size = map.options.prepare.voxel_size
@@ -138,7 +138,11 @@ def locate_batch(
     )
     context = context_of(context)
     clouds = _set_of(scans, "scans")
-    names = [f"scans[{k}]" for k in range(len(clouds))]
+    names = (
+        list(clouds.names)
+        if isinstance(clouds, FragmentSet)
+        else [f"scans[{k}]" for k in range(len(clouds))]
+    )
     inputs = [_load(clouds, map.options.prepare, "scans", k) for k in range(len(clouds))]
     up = (
         None

@@ -363,6 +363,30 @@ def test_another_run_is_refused(source, tmp_path):
         gpureg.register_all(clouds, output=tmp_path, progress=False)
 
 
+def test_the_table_has_the_names_of_the_files(source, tmp_path):
+    scans, keywords = tmp_path / "scans", {"options": few(100, 0.1), "progress": False}
+    scans.mkdir()
+    for k, name in enumerate(["room 10.ply", "hall <b>.ply", "room 9.ply"]):
+        gpureg.write_point_cloud(scans / "next.ply", source[500 * k : 500 * k + 500])
+        (scans / "next.ply").rename(scans / name)
+    run = gpureg.register_all(scans, output=tmp_path / "run", **keywords)
+    table = run.table()
+    assert table["name_i"].to_pylist() == ["hall <b>.ply", "hall <b>.ply", "room 9.ply"]
+    assert table["name_j"].to_pylist() == ["room 9.ply", "room 10.ply", "room 10.ply"]
+    assert gpureg.register_all(scans, output=tmp_path / "run", **keywords).resumed == 3
+    # More pairs, taken up from the finished table.
+    two = gpureg.register_all(scans, [(0, 1)], output=tmp_path / "two", **keywords)
+    assert two.pairs == 1
+    all_of_two = gpureg.register_all(scans, output=tmp_path / "two", **keywords)
+    assert all_of_two.resumed == 1 and files_of(all_of_two) == files_of(run)
+    # Another file comes first, and moves the numbers.
+    gpureg.write_point_cloud(scans / "attic.ply", source[:500])
+    with pytest.raises(
+        ValueError, match="fragment 0 was 'hall <b>.ply', now 'attic.ply': the list"
+    ):
+        gpureg.register_all(scans, output=tmp_path / "run", **keywords)
+
+
 def test_two_processes_do_not_share_a_folder(source, tmp_path):
     seen = []
 

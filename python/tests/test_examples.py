@@ -132,3 +132,34 @@ def test_mypy_strict(path):
     from test_stubs import run as run_module
 
     run_module("mypy", "--config-file", str(ROOT / "pyproject.toml"), str(path))
+
+
+def test_bag(source, tmp_path):
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+    field = types["sensor_msgs/msg/PointField"]
+    cloud = types["sensor_msgs/msg/PointCloud2"]
+    header, time = types["std_msgs/msg/Header"], types["builtin_interfaces/msg/Time"]
+    with Writer(tmp_path / "bag", version=9) as writer:
+        topic = writer.add_connection("/points", cloud.__msgtype__, typestore=store)
+        for k in range(3):
+            rows = np.zeros((100, 5), np.float32)  # x y z intensity ring
+            rows[:, :3] = source[100 * k : 100 * k + 100]
+            rows[0, 0] = np.nan
+            message = cloud(
+                header(time(1305031102 + k, 175304000), "lidar"),
+                *(1, 100),
+                [field(name, 4 * n, 7, 1) for n, name in enumerate("xyz")],
+                *(False, 20, 2000, rows.view(np.uint8).ravel(), False),
+            )
+            writer.write(topic, 10 * k, store.serialize_cdr(message, cloud.__msgtype__))
+    shown = run("14_bag.py", tmp_path / "bag", tmp_path / "scans", "--every", "2")
+    assert shown.startswith("2 clouds of /points")
+    scans = gpureg.FragmentSet.from_directory(tmp_path / "scans")
+    assert scans.names == ("1305031102.175304000.ply", "1305031104.175304000.ply")
+    written = gpureg.read_point_cloud(tmp_path / "scans" / scans.names[1]).points
+    assert np.array_equal(written, source[201:300].astype(np.float32))

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """FragmentSet: what is in a folder, and which pairs are meant."""
 
+import os
+
 import gpureg
 import numpy as np
 import pytest
+
+NAMES = ("Flur 9.ply", "Flur 10.ply", "great hall.ply", "K\u00fcche <b>.PLY")
 
 
 @pytest.fixture()
@@ -24,6 +28,60 @@ def test_folder(folder):
     assert viewpoints.tolist() == [[1, 2, 3]]
     with pytest.raises(gpureg.IoError):
         gpureg.FragmentSet.from_directory(folder / "nowhere")
+
+
+@pytest.fixture()
+def named(tmp_path, source):
+    for k, name in enumerate(NAMES):
+        gpureg.write_point_cloud(tmp_path / "first.ply", source[:100] + k)
+        (tmp_path / "first.ply").rename(tmp_path / name)
+    (tmp_path / "upstairs").mkdir()
+    gpureg.write_point_cloud(tmp_path / "upstairs" / "bath.ply", source[:100])
+    (tmp_path / "cameras.txt").write_text("great hall.ply 0 1 2 3 0 0 0 1\n1 0 4 5 6 0 0 0 1\n")
+    return tmp_path
+
+
+def test_names_of_any_folder(named):
+    fragments = gpureg.FragmentSet.from_directory(named)
+    assert fragments.names == NAMES and fragments.numbers == (0, 1, 2, 3)
+    viewpoints = [fragments.load(k, gpureg.PrepareOptions())[3] for k in range(4)]
+    assert viewpoints[0] is viewpoints[3] is None
+    assert viewpoints[2].tolist() == [[1, 2, 3]] and viewpoints[1].tolist() == [[4, 5, 6]]
+    (named / "readme.md").write_text("")
+    with pytest.warns(UserWarning, match="1 file that is no cloud is skipped in .*: readme.md"):
+        below = gpureg.FragmentSet.from_directory(named, recursive=True)
+    assert below.names == (*NAMES, "upstairs/bath.ply")
+    assert fragments.without([0]).names == NAMES[1:]
+
+
+def test_patterns_and_lists(named):
+    of = gpureg.FragmentSet.from_directory
+    assert of(named / "Flur*.ply").names == NAMES[:2]
+    assert of(str(named / "**" / "b*.ply")).names == ("bath.ply",)
+    (named / "list.txt").write_text("great hall.ply  Hall\nFlur 10.ply\n", "utf-8")
+    assert of(named / "list.txt").names == ("Hall", "Flur 10.ply")
+    with pytest.raises(gpureg.IoError, match="is one cloud"):
+        of(named / "great hall.ply")
+    with pytest.raises(gpureg.IoError, match="recursive=True"):
+        of(named.parent)
+    clouds = gpureg.FragmentSet.from_clouds([named / NAMES[0], named / NAMES[2]])
+    assert clouds.names == (NAMES[0], NAMES[2])
+    assert gpureg.FragmentSet.from_clouds([np.zeros((4, 3))] * 2).names == ("0", "1")
+    assert gpureg.FragmentSet.from_clouds([np.zeros((4, 3))], ["hall"]).names == ("hall",)
+
+
+def test_a_name_that_is_no_text(tmp_path, source):
+    gpureg.write_point_cloud(tmp_path / "a.ply", source[:100])
+    os.rename(tmp_path / "a.ply", os.fsencode(tmp_path) + b"/b\xff.ply")
+    assert gpureg.FragmentSet.from_directory(tmp_path).names == ("b?.ply",)
+
+
+def test_pairs_by_name(named):
+    fragments = gpureg.FragmentSet.from_directory(named)
+    pairs = [("great hall.ply", "Flur 10"), ("great hall", 0)]
+    assert fragments.choose_pairs(pairs).tolist() == [[1, 2], [0, 2]]
+    with pytest.raises(ValueError, match="no fragment named 'cellar'"):
+        fragments.choose_pairs([("cellar", 0)])
 
 
 def test_cameras(folder):

@@ -26,7 +26,19 @@ void expect_fields(const files::TextFile& file, std::size_t fields, const char* 
     file.fail("the line has " + std::to_string(file.fields().size()) + " fields, expected " + what);
 }
 
-TrajectoryFormat format_of(const files::TextFile& file) {
+/// The time of a line whose first fields, all but some, are a name or a number; none: neither.
+std::optional<double> named_time(const files::TextFile& file, std::size_t others,
+                                 const TimeOfName& time_of) {
+  const std::vector<std::string_view>& fields = file.fields();
+  if (!time_of || fields.size() <= others) return {};
+  const std::string_view last = fields[fields.size() - others - 1];
+  return time_of(
+      {fields[0].data(), static_cast<std::size_t>(last.data() - fields[0].data()) + last.size()});
+}
+
+TrajectoryFormat format_of(const files::TextFile& file, const TimeOfName& time_of) {
+  if (named_time(file, kTumFields - 1, time_of)) return TrajectoryFormat::tum;
+  if (named_time(file, 0, time_of)) return TrajectoryFormat::blocks;
   switch (file.fields().size()) {
     case kTumFields:
       return TrajectoryFormat::tum;
@@ -45,17 +57,19 @@ TrajectoryFormat format_of(const files::TextFile& file) {
   }
 }
 
-StampedPose tum_pose(const files::TextFile& file) {
-  expect_fields(file, kTumFields, "8: time tx ty tz qx qy qz qw");
+StampedPose tum_pose(const files::TextFile& file, const TimeOfName& time_of) {
+  const std::optional<double> named = named_time(file, kTumFields - 1, time_of);
+  if (!named) expect_fields(file, kTumFields, "8: time tx ty tz qx qy qz qw");
   StampedPose pose;
-  pose.time = file.number(0, "time");
-  const Eigen::Quaterniond q(file.number(7, "qw"), file.number(4, "qx"), file.number(5, "qy"),
-                             file.number(6, "qz"));
+  pose.time = named ? *named : file.number(0, "time");
+  const std::size_t at = file.fields().size() - kTumFields;  // a name has a field or more
+  const Eigen::Quaterniond q(file.number(at + 7, "qw"), file.number(at + 4, "qx"),
+                             file.number(at + 5, "qy"), file.number(at + 6, "qz"));
   if (std::abs(q.norm() - 1) > kNormTolerance)
     file.fail("the quaternion has length " + std::to_string(q.norm()) + ", expected 1");
   pose.world_from_body.topLeftCorner<3, 3>() = q.normalized().toRotationMatrix();
-  pose.world_from_body.topRightCorner<3, 1>() =
-      Eigen::Vector3d(file.number(1, "tx"), file.number(2, "ty"), file.number(3, "tz"));
+  pose.world_from_body.topRightCorner<3, 1>() = Eigen::Vector3d(
+      file.number(at + 1, "tx"), file.number(at + 2, "ty"), file.number(at + 3, "tz"));
   return pose;
 }
 
@@ -70,15 +84,16 @@ StampedPose kitti_pose(const files::TextFile& file, std::size_t place) {
 }
 
 /// Without a number, the block counts by its place.
-StampedPose block_pose(files::TextFile& file, std::size_t place) {
+StampedPose block_pose(files::TextFile& file, std::size_t place, const TimeOfName& time_of) {
   StampedPose pose;
   pose.time = static_cast<double>(place);
   const auto is_matrix = [&] {
     return file.fields().size() == kRowFields || file.fields().size() == kMatrixFields;
   };
-  if (!is_matrix()) {
-    expect_fields(file, kNumberFields, "1: the number of a 4 x 4 block");
-    pose.time = file.number(0, "number");
+  const std::optional<double> named = named_time(file, 0, time_of);
+  if (named || !is_matrix()) {
+    if (!named) expect_fields(file, kNumberFields, "1: the number of a 4 x 4 block");
+    pose.time = named ? *named : file.number(0, "number");
     if (!file.next()) file.fail("the file ends within a 4 x 4 block");
   }
   const bool whole = file.fields().size() == kMatrixFields;
@@ -100,19 +115,23 @@ void append(std::string& text, double value, char end) {
 
 }  // namespace
 
-Trajectory read_trajectory(const std::string& path, TrajectoryFormat format) {
+Trajectory read_trajectory(const std::string& path, TrajectoryFormat format,
+                           const TimeOfName& time_of) {
   Trajectory poses;
   files::TextFile file(path, '#');
   while (file.next()) {
-    if (format == TrajectoryFormat::automatic) format = format_of(file);
+    if (format == TrajectoryFormat::automatic) format = format_of(file, time_of);
     if (format == TrajectoryFormat::tum)
-      poses.push_back(tum_pose(file));
+      poses.push_back(tum_pose(file, time_of));
     else if (format == TrajectoryFormat::kitti)
       poses.push_back(kitti_pose(file, poses.size()));
     else
-      poses.push_back(block_pose(file, poses.size()));
+      poses.push_back(block_pose(file, poses.size(), time_of));
   }
   if (poses.empty()) throw IoError(path + ": holds no pose");
+  poses.erase(std::remove_if(poses.begin(), poses.end(),
+                             [](const StampedPose& pose) { return std::isnan(pose.time); }),
+              poses.end());
   std::stable_sort(poses.begin(), poses.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.time < b.time; });
   for (std::size_t k = 1; k < poses.size(); ++k)

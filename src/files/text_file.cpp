@@ -50,6 +50,15 @@ void read_up_to(const Descriptor& file, const std::string& path, std::size_t byt
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 
+// "scan.e57#3" is a name.
+std::size_t comment_at(std::string_view line, char mark) {
+  std::size_t at = line.find(mark);
+  while (at != std::string_view::npos && at > 0 && !is_space(line[at - 1]) &&
+         at + 1 < line.size() && line[at + 1] >= '0' && line[at + 1] <= '9')
+    at = line.find(mark, at + 1);
+  return at;
+}
+
 // std::from_chars takes no '+', which some writers put in front of numbers; unlike strtod it does
 // not depend on the locale.
 template <typename T>
@@ -101,7 +110,7 @@ bool TextFile::next() {
     std::string_view rest(content_.data() + position_, end - position_);
     position_ = end + 1;
     ++line_;
-    if (comment_ != '\0') rest = rest.substr(0, rest.find(comment_));
+    if (comment_ != '\0') rest = rest.substr(0, comment_at(rest, comment_));
     fields_.clear();
     for (std::size_t k = 0; k < rest.size();) {
       if (is_space(rest[k])) {

@@ -59,8 +59,10 @@ TEST_F(BadCloud, MissingFilesAndFolders) {
   expect_refused({"register", scans_.path(), good_}, {scans_.path(), "folder"});
   expect_refused({"batch", missing, "-o", scans_ / "r.log"}, {missing, "No such file"});
   const TemporaryFolder empty;
-  expect_refused({"batch", empty.path(), "-o", scans_ / "r.log"}, {empty.path(), "cloud_bin"});
-  expect_refused({"batch", scans_.path(), "-o", scans_ / "r.log"}, {scans_.path(), "one fragment"});
+  expect_refused({"batch", empty.path(), "-o", scans_ / "r.log"},
+                 {empty.path(), "is empty", "PLY"});
+  expect_refused({"batch", scans_.path(), "-o", scans_ / "r.log"},
+                 {scans_.path(), "one scan, cloud_bin_0.ply"});
 }
 
 TEST_F(BadCloud, CamerasAndPairs) {

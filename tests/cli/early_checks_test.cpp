@@ -56,8 +56,8 @@ TEST_F(EarlyChecks, OfPairsAndPoses) {
 }
 
 TEST_F(EarlyChecks, OfScansBeforeTheMap) {
-  // The folder has no poses: it is no scan.
-  expect_refused({"locate", scans_.path(), cloud_}, {scans_.path() + " has neither poses.txt"});
+  // The folder has no poses: it is many scans to be located, and none to be compared.
+  expect_refused({"locate", scans_.path(), cloud_}, {scans_ / "cloud_bin_0.ply"});
   expect_refused({"change", scans_.path(), cloud_}, {scans_.path() + " has neither poses.txt"});
   expect_refused({"locate", out_ / "none.ply", cloud_}, {"SCAN", "none.ply"});
   expect_refused({"info", cloud_, out_ / "none.ply"}, {"CLOUD", "none.ply"});

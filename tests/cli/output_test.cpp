@@ -61,13 +61,13 @@ TEST_F(Output, NoOutputIsWrittenOverAnInputOrAnotherOutput) {
   for (const std::string& same : {b, detour + "/cloud_bin_1.ply", out_ / "link.ply"}) {
     for (const char* option : {"--json", "--overlay", "--image"})
       expect_refused({"register", a, b, option, same}, {option, "TARGET", "different files", b});
-    expect_refused(batch(log, {"--json", same}), {"--json", "DIR", "different files", b});
+    expect_refused(batch(log, {"--json", same}), {"--json", "SCANS", "different files", b});
   }
   expect_refused({"register", a, b, "--image", a}, {"--image", "SOURCE", a});
   expect_refused({"register", a, b, "--image", out_ / "x", "--json", out_ / "./x"},
                  {"--image", "--json", out_ / "./x"});
   const std::string cameras = scans_.write("cameras.txt", "0 0 0 0 0 0 0 0 1\n");
-  expect_refused(batch(log, {"--info", cameras}), {"--info", "DIR", cameras});
+  expect_refused(batch(log, {"--info", cameras}), {"--info", "SCANS", cameras});
   const std::string pairs = out_.write("pairs.txt", "0 1\n");
   expect_refused(batch(log, {"--pairs", pairs, "--info", pairs}), {"--info", "--pairs", pairs});
   expect_refused(batch(log, {"--json", log + ".journal"}), {"--json", "journal of -o"});

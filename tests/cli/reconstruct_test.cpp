@@ -305,9 +305,9 @@ TEST_F(ReconstructCommand, CtrlCEndsTheAudit) {
 }
 
 TEST_F(ReconstructCommand, RefusesFoldersThatCannotWork) {
-  expect_refused(reconstruct("map"), {"no fragments"});
+  expect_refused(reconstruct("map"), {"is empty"});
   write_scans(scans_, 1, false);
-  expect_refused(reconstruct("map"), {"one fragment"});
+  expect_refused(reconstruct("map"), {"one scan"});
   write_scans(scans_, 2, false);
   expect_refused(joined({"reconstruct", scans_.path(), "-o", scans_.path()}, kSmall),
                  {"different folders"});

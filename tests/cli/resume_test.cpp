@@ -163,9 +163,10 @@ TEST_F(Resume, ChangedOptionsAreRefused) {
   refused({"--pairs", pairs}, {"pairs.count was 28, now 1"});
   // The fragments themselves count as well.
   write_cloud(scans_, "cloud_bin_3.ply", room_scan(9));
-  refused({}, {"fragments[3].hash was"});
+  refused({}, {"cloud_bin_3.ply is another cloud than before"});
+  write_cloud(scans_, "cloud_bin_3.ply", room_scan(3));
   std::filesystem::remove(scans_ / "cloud_bin_7.ply");
-  refused({}, {"cannot resume"});
+  refused({}, {"cannot resume", "cloud_bin_7.ply is not there any more"});
 }
 
 TEST_F(Resume, DamagedJournalsAreRefused) {

@@ -66,8 +66,9 @@ TEST_F(Usage, VoxelSizes) {
 TEST_F(Usage, AVoxelLargerThanTheCloud) {
   // Five points would be left, which any pose brings together.
   expect_refused(with({"--voxel-size", "1000"}), {"voxel_size is 1000", cloud_, "extends over"});
-  write_scans(folder_, 2, false);
-  expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--voxel-size", "1000"},
+  const TemporaryFolder scans;
+  write_scans(scans, 2, false);
+  expect_refused({"batch", scans.path(), "-o", folder_ / "r.log", "--voxel-size", "1000"},
                  {"voxel_size is 1000", "extends over"});
 }
 

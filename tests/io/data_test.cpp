@@ -39,9 +39,9 @@ TEST(Data, KnownCounts) {
 
 TEST(Data, FragmentsAndCamerasOfTheRedKitchen) {
   GPUREG_DATA_FOLDER_OR_SKIP(kitchen, "redkitchen/fragments");
-  const auto fragments = list_fragments(kitchen);
+  const auto fragments = list_scans(kitchen);
   ASSERT_EQ(fragments.size(), 20u);
-  for (int k = 0; k < 20; ++k) EXPECT_EQ(fragments[k].first, k);
+  for (int k = 0; k < 20; ++k) EXPECT_EQ(fragments[k].number, k);
   const auto cameras = read_cameras(kitchen + "/cameras.txt");
   ASSERT_EQ(cameras.size(), 20u);
   for (const auto& [fragment, positions] : cameras) EXPECT_EQ(positions.size(), 50u) << fragment;

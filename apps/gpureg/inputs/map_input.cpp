@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "inputs/map_input.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 
 #include "gpureg/error.hpp"
 #include "inputs/cloud_file.hpp"
@@ -27,31 +29,37 @@ struct PosedScans {
 /// The largest island.
 PosedScans of_reconstruction(const std::string& path, const std::string& file) {
   const SavedMap map = read_saved_map(file);
-  if (!fs::is_directory(map.scans))
-    throw IoError(file + " names the scans of " + map.scans + ", which is not there");
+  if (!map.scans.exists())
+    throw IoError(file + " names the scans of " + map.scans.path + ", which is not there");
   if (map.islands.size() > 1)
     std::cerr << "gpureg: note: " << path << " has " << map.islands.size()
               << " islands, the map is the largest one" << std::endl;
   PosedScans out{FragmentFolder(map.scans, false), {}};
   out.poses.assign(out.folder.numbers.size(), no_pose());
-  for (const int number : map.islands.front())
-    if (out.folder.has(number)) out.poses[out.folder.index_of(number)] = map.poses.at(number);
+  const std::vector<int>& largest = map.islands.front();
+  for (std::size_t k = 0; k < out.folder.scans.size(); ++k)
+    if (const auto number = map.number_of(out.folder.scans[k]);
+        number && std::find(largest.begin(), largest.end(), *number) != largest.end())
+      out.poses[k] = map.poses.at(*number);
   return out;
 }
 
-PosedScans posed_scans(const std::string& path) {
+constexpr const char* kPoseFiles[] = {"poses.txt", "trajectory.txt"};
+
+PosedScans posed_scans(const ScanInput& input) {
+  const std::string& path = input.path;
   if (const std::string file = saved_map_file(path); !file.empty())
     return of_reconstruction(path, file);
-  for (const char* name : {"poses.txt", "trajectory.txt"}) {
-    const fs::path file = fs::path(path) / name;
+  for (const char* name : kPoseFiles) {
+    const fs::path file = fs::path(input.folder()) / name;
     if (!fs::exists(file)) continue;
     PosedScans out;
     try {
-      out.folder = FragmentFolder(path, false);
+      out.folder = FragmentFolder(input, false);
     } catch (const IoError& error) {
       throw IoError(std::string(error.what()) + "; nor a reconstruction.json" + kWrittenLast);
     }
-    out.poses = read_scan_poses(file.string(), out.folder.numbers, path);
+    out.poses = read_scan_poses(file.string(), out.folder.scans, path);
     return out;
   }
   throw IoError(path +
@@ -59,9 +67,9 @@ PosedScans posed_scans(const std::string& path) {
                 "a reconstruction.json" + kWrittenLast);
 }
 
-PreparedMap map_of_scans(const Context& context, const std::string& path,
+PreparedMap map_of_scans(const Context& context, const ScanInput& input,
                          const localization::MapOptions& options) {
-  const auto [folder, poses] = posed_scans(path);
+  const auto [folder, poses] = posed_scans(input);
   MapBuilder builder(options);
   Progress progress("mapping", "scans", folder.numbers.size(), false);
   for (std::size_t k = 0; k < folder.numbers.size(); ++k) {
@@ -71,7 +79,7 @@ PreparedMap map_of_scans(const Context& context, const std::string& path,
     try {
       builder.add_scan(context, cloud.view(), poses[k]);
     } catch (const InvalidArgument& error) {
-      throw InvalidArgument(folder.files[k] + ": " + error.what());
+      throw InvalidArgument(folder.scans[k].path + ": " + error.what());
     }
     progress.update(k + 1);
   }
@@ -80,10 +88,19 @@ PreparedMap map_of_scans(const Context& context, const std::string& path,
 
 }  // namespace
 
-std::string scans_of_reconstruction(const std::string& file) { return read_saved_map(file).scans; }
+ScanInput scans_of_reconstruction(const std::string& file) { return read_saved_map(file).scans; }
 
-MapInput::MapInput(std::string of) : path(std::move(of)) {
-  if (fs::is_directory(path)) {
+bool has_poses(const ScanInput& input) {
+  std::error_code ignored;
+  const fs::path folder = input.folder();
+  return !saved_map_file(input.path).empty() ||
+         std::any_of(std::begin(kPoseFiles), std::end(kPoseFiles),
+                     [&](const char* name) { return fs::exists(folder / name, ignored); });
+}
+
+MapInput::MapInput(std::string of, bool with_subfolders)
+    : path(std::move(of)), recursive(with_subfolders) {
+  if (io::names_scans(path)) {
     kind = Kind::scans;
   } else if (PreparedMap::is_saved(path)) {
     kind = Kind::saved;
@@ -95,7 +112,7 @@ PreparedMap MapInput::prepare(const Context& context,
                               const localization::MapOptions& options) const {
   if (saved) return *saved;
   try {
-    if (kind == Kind::scans) return map_of_scans(context, path, options);
+    if (kind == Kind::scans) return map_of_scans(context, {path, recursive}, options);
     const PointCloud cloud =
         read_cloud(path, mesh_spacing(options.prepare.voxel_size), MeshNote::print);
     return localization::prepare_map(cloud.view(), options);
@@ -106,7 +123,7 @@ PreparedMap MapInput::prepare(const Context& context,
 
 PointCloud read_scan(const std::string& path, const Context& context,
                      const localization::MapOptions& options) {
-  if (!fs::is_directory(path))
+  if (!io::names_scans(path))
     return read_cloud(path, mesh_spacing(options.prepare.voxel_size), MeshNote::print);
   return MapInput(path).prepare(context, options).cloud();
 }

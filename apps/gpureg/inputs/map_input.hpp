@@ -5,19 +5,21 @@
 #include <string>
 
 #include "gpureg/localization.hpp"
+#include "inputs/scan_input.hpp"
 
 namespace gpureg::cli {
 
-/// A map as the command line names it: a file of `--save-map`, a cloud or mesh, a folder of scans
-/// with their poses in poses.txt or trajectory.txt, or the output folder of `gpureg reconstruct`,
-/// of which the largest island counts.
+/// A map as the command line names it: a file of `--save-map`, a cloud or mesh, a folder (pattern,
+/// list) of scans with their poses in poses.txt or trajectory.txt beside them, or the output folder
+/// of `gpureg reconstruct`, of which the largest island counts.
 struct MapInput {
   std::string path;
+  bool recursive = false;  ///< of a folder of scans
   enum class Kind { saved, cloud, scans } kind = Kind::cloud;
   std::optional<localization::PreparedMap> saved;  ///< of a saved map
 
   /// Recognises the kind; reads a saved map. Throws IoError.
-  explicit MapInput(std::string of);
+  explicit MapInput(std::string of, bool with_subfolders = false);
 
   /// Of a saved map; else the given ones.
   localization::MapOptions options_or(const localization::MapOptions& otherwise) const {
@@ -30,10 +32,14 @@ struct MapInput {
                                     const localization::MapOptions& options) const;
 };
 
-/// The folder of the scans of a reconstruction.json, which names it from where `reconstruct` ran,
-/// or the folder of that name beside the output of `reconstruct`.
-/// @throws IoError naming the file: damaged, or neither folder is there.
-std::string scans_of_reconstruction(const std::string& file);
+/// The scans of a reconstruction.json, which names them from where `reconstruct` ran, or those of
+/// that name beside the output of `reconstruct`.
+/// @throws IoError naming the file: damaged, or neither is there.
+ScanInput scans_of_reconstruction(const std::string& file);
+
+/// Whether there are poses of the scans of a folder: a reconstruction.json, poses.txt or
+/// trajectory.txt.
+bool has_poses(const ScanInput& input);
 
 /// A scan as the command line names it: a cloud or mesh, or a folder of scans with their poses by
 /// odometry, which become one.

@@ -71,18 +71,18 @@ PosesByNumber of_log(const std::string& path, std::map<std::int64_t, std::uint32
 
 reconstruction::Reconstruction map_of(const PosesByNumber& poses,
                                       const std::map<std::int64_t, std::uint32_t>& island,
-                                      const std::vector<int>& numbers, const std::string& path,
-                                      const std::string& folder) {
-  std::vector<UnalignedIsometry3d> known(numbers.size(), no_pose());
-  std::vector<std::uint32_t> islands(numbers.size(), 0);
+                                      const std::vector<io::ScanFile>& scans,
+                                      const std::string& path, const std::string& folder) {
+  std::vector<UnalignedIsometry3d> known(scans.size(), no_pose());
+  std::vector<std::uint32_t> islands(scans.size(), 0);
   std::map<std::uint32_t, std::uint32_t> counted;  // those without a fragment here do not count
   std::size_t count = 0;
-  for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const auto pose = poses.find(numbers[k]);
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    const auto pose = poses.find(scans[k].number);
     if (pose == poses.end()) continue;
     known[k] = pose->second;
     ++count;
-    const auto at = island.find(numbers[k]);
+    const auto at = island.find(scans[k].number);
     if (at != island.end())
       islands[k] =
           counted.insert({at->second, static_cast<std::uint32_t>(counted.size())}).first->second;
@@ -92,16 +92,16 @@ reconstruction::Reconstruction map_of(const PosesByNumber& poses,
 }
 
 reconstruction::Reconstruction read_pose_file(const std::string& path,
-                                              const std::vector<int>& numbers,
+                                              const std::vector<io::ScanFile>& scans,
                                               const std::string& folder) {
   const std::vector<std::string> first = first_line(path);
   const std::string& tag = first.front();
   const bool graph = tag.rfind("VERTEX", 0) == 0 || tag.rfind("EDGE", 0) == 0 || tag == "FIX";
-  if (!graph && first.size() != 3)
-    return reconstruction::map_of_poses(read_scan_poses(path, numbers, folder));
+  if (!graph && !is_log(path))
+    return reconstruction::map_of_poses(read_scan_poses(path, scans, folder));
   std::map<std::int64_t, std::uint32_t> island;
   const PosesByNumber poses = graph ? of_graph(path) : of_log(path, island);
-  return map_of(poses, island, numbers, path, folder);
+  return map_of(poses, island, scans, path, folder);
 }
 
 }  // namespace gpureg::cli

@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
+#include <optional>
 #include <sstream>
+#include <string_view>
 
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
@@ -16,28 +19,38 @@ bool is_log(const std::string& path) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {
     std::istringstream fields(line.substr(0, line.find('#')));
-    int count = 0;
-    for (std::string field; fields >> field;) ++count;
-    if (count > 0) return count == 3;
+    int count = 0, numbers = 0;
+    for (std::string field; fields >> field; ++count)
+      numbers += field.front() >= '0' && field.front() <= '9';
+    if (count > 0) return count == 3 && numbers > 0;
   }
   return false;
 }
 
 namespace {
 
+using Scans = std::vector<io::ScanFile>;
+
 [[noreturn]] void fail(const std::string& path, const std::string& why) {
   throw IoError(path + ": " + why);
 }
 
-std::vector<reconstruction::Odometry> from_log(const std::string& path,
-                                               const std::vector<int>& numbers,
+std::optional<std::size_t> place_of(const Scans& scans, int number) {
+  const auto at =
+      std::lower_bound(scans.begin(), scans.end(), number,
+                       [](const io::ScanFile& scan, int value) { return scan.number < value; });
+  if (at == scans.end() || at->number != number) return {};
+  return static_cast<std::size_t>(at - scans.begin());
+}
+
+std::vector<reconstruction::Odometry> from_log(const std::string& path, const Scans& scans,
                                                const std::string& folder,
                                                const std::vector<int>& unusable) {
   const auto scan_of = [&](int number) {
-    const auto at = std::lower_bound(numbers.begin(), numbers.end(), number);
-    if (at == numbers.end() || *at != number)
+    const auto place = place_of(scans, number);
+    if (!place)
       fail(path, "names fragment " + std::to_string(number) + ", which " + folder + " lacks");
-    return static_cast<std::uint32_t>(at - numbers.begin());
+    return static_cast<std::uint32_t>(*place);
   };
   const auto is_unusable = [&](int number) {
     return std::find(unusable.begin(), unusable.end(), number) != unusable.end();
@@ -58,20 +71,48 @@ std::vector<reconstruction::Odometry> from_log(const std::string& path,
   return odometry;
 }
 
-std::vector<UnalignedIsometry3d> poses_of(const std::string& path,
-                                          const std::vector<int>& numbers) {
-  std::vector<UnalignedIsometry3d> world_from_scan(numbers.size(), no_pose());
-  for (const evaluation::StampedPose& pose : evaluation::read_trajectory(path)) {
+/// Times of names are the scans' numbers. Who names scans by their times, 1305031102.175304.ply,
+/// has poses of other times too.
+class Names {
+ public:
+  explicit Names(const Scans& scans) : scans_(scans) {}
+
+  std::optional<double> time_of(std::string_view word) {
+    constexpr std::size_t kDigits = 9;  // longer numbers are times
+    if (word.size() <= kDigits && word.find_first_not_of("0123456789") == std::string_view::npos)
+      return {};
+    if (const auto k = io::find_scan(scans_, word)) {
+      found_ = true;
+      return scans_[*k].number;
+    }
+    if (word.find_first_not_of("+-.0123456789eE \t") == std::string_view::npos) return {};
+    // The poses of a longer run serve some of its scans.
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+
+  bool found() const { return found_; }
+
+ private:
+  const Scans& scans_;
+  bool found_ = false;
+};
+
+std::vector<UnalignedIsometry3d> poses_of(const std::string& path, const Scans& scans) {
+  std::vector<UnalignedIsometry3d> world_from_scan(scans.size(), no_pose());
+  Names names(scans);
+  for (const evaluation::StampedPose& pose :
+       evaluation::read_trajectory(path, evaluation::TrajectoryFormat::automatic,
+                                   [&](std::string_view word) { return names.time_of(word); })) {
     constexpr double kMost = 2147483647;
-    if (!(pose.time >= 0 && pose.time <= kMost && pose.time == std::floor(pose.time)))
-      fail(path,
-           "has the time " + std::to_string(pose.time) + ", expected the number of a fragment");
+    if (!(pose.time >= 0 && pose.time <= kMost && pose.time == std::floor(pose.time))) {
+      if (names.found()) continue;
+      fail(path, "has the time " + std::to_string(pose.time) +
+                     ", expected the number of a fragment or the name of a scan");
+    }
     const auto number = static_cast<int>(pose.time);
     // The odometry of a longer run serves a folder with some of its scans.
-    const auto at = std::lower_bound(numbers.begin(), numbers.end(), number);
-    if (at != numbers.end() && *at == number)
-      world_from_scan[static_cast<std::size_t>(at - numbers.begin())].matrix() =
-          pose.world_from_body;
+    if (const auto place = place_of(scans, number))
+      world_from_scan[*place].matrix() = pose.world_from_body;
   }
   return world_from_scan;
 }
@@ -79,20 +120,20 @@ std::vector<UnalignedIsometry3d> poses_of(const std::string& path,
 }  // namespace
 
 std::vector<reconstruction::Odometry> read_odometry(const std::string& path,
-                                                    const std::vector<int>& numbers,
+                                                    const std::vector<io::ScanFile>& scans,
                                                     const std::string& folder,
                                                     const std::vector<int>& unusable) {
   std::vector<reconstruction::Odometry> odometry =
-      is_log(path) ? from_log(path, numbers, folder, unusable)
-                   : reconstruction::odometry_of_poses(poses_of(path, numbers));
+      is_log(path) ? from_log(path, scans, folder, unusable)
+                   : reconstruction::odometry_of_poses(poses_of(path, scans));
   if (odometry.empty()) fail(path, "holds no pose of two scans of " + folder);
   return odometry;
 }
 
 std::vector<UnalignedIsometry3d> read_scan_poses(const std::string& path,
-                                                 const std::vector<int>& numbers,
+                                                 const std::vector<io::ScanFile>& scans,
                                                  const std::string& folder) {
-  std::vector<UnalignedIsometry3d> poses = poses_of(path, numbers);
+  std::vector<UnalignedIsometry3d> poses = poses_of(path, scans);
   const auto known = std::count_if(poses.begin(), poses.end(), [](const UnalignedIsometry3d& p) {
     return p.matrix().allFinite();
   });

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "gpureg/io.hpp"
 #include "gpureg/reconstruction.hpp"
 
 namespace gpureg::cli {
@@ -11,25 +12,26 @@ namespace gpureg::cli {
 /// Whether the first line with content has three fields, as the blocks of a Redwood log.
 bool is_log(const std::string& path);
 
-/// Relative poses of scans from a file. A trajectory (TUM, whose times are numbers of fragments, or
-/// poses.txt) gives those of consecutive scans of the folder; a Redwood log gives its pairs.
-/// @param numbers of the fragments, ascending.
+/// Relative poses of scans from a file. A trajectory (TUM, whose times are numbers or names of
+/// scans, or poses.txt) gives those of consecutive scans; a Redwood log gives its pairs.
+/// @param scans ascending by number.
 /// @param folder for messages.
-/// @param unusable numbers of fragments whose poses are left out.
+/// @param unusable numbers of scans whose poses are left out.
 /// @throws IoError naming the file: no such file, numbers that the folder lacks, nothing in it.
 std::vector<reconstruction::Odometry> read_odometry(const std::string& path,
-                                                    const std::vector<int>& numbers,
+                                                    const std::vector<io::ScanFile>& scans,
                                                     const std::string& folder,
                                                     const std::vector<int>& unusable = {});
 
-/// Poses of fragments from a trajectory (TUM, whose times are numbers of fragments, or poses.txt);
-/// no_pose() of fragments that it lacks.
-/// @param numbers of the fragments, ascending.
+/// Poses of scans from a trajectory (TUM, whose times are numbers or names of scans, or poses.txt);
+/// no_pose() of scans that it lacks.
+/// @param scans ascending by number.
 /// @param folder for messages.
-/// @throws IoError naming the file: no such file, times that are no numbers of fragments, fewer
-/// than two poses of fragments.
+/// @throws IoError naming the file: no such file, times that are no numbers, fewer than two poses
+/// of
+///   scans.
 std::vector<UnalignedIsometry3d> read_scan_poses(const std::string& path,
-                                                 const std::vector<int>& numbers,
+                                                 const std::vector<io::ScanFile>& scans,
                                                  const std::string& folder);
 
 }  // namespace gpureg::cli

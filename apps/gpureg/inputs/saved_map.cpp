@@ -21,6 +21,8 @@ const Json& list_member(const Json& object, const char* name) {
 }
 
 void add_scan(const Json& scan, SavedMap& map) {
+  if (const auto name = scan.find("name"); name != scan.end() && name->is_string())
+    map.numbers[name->get<std::string>()] = fragment_member(scan, "id");
   if (member(scan, "island").is_null()) return;  // it is left out
   const int number = fragment_member(scan, "id");
   const auto island = static_cast<std::size_t>(fragment_member(scan, "island"));
@@ -35,6 +37,13 @@ void add_scan(const Json& scan, SavedMap& map) {
 }
 
 }  // namespace
+
+std::optional<int> SavedMap::number_of(const io::ScanFile& scan) const {
+  const auto found = numbers.find(scan.name);
+  const int number = found != numbers.end() ? found->second : scan.number;
+  if ((found == numbers.end() && !numbers.empty()) || poses.count(number) == 0) return {};
+  return number;
+}
 
 std::string saved_map_file(const std::string& path) {
   std::error_code ignored;
@@ -52,7 +61,8 @@ SavedMap read_saved_map(const std::string& file) {
   DocumentFile document(file);
   const Json json = document.read();
   try {
-    map.scans = text_member(json, "folder");
+    map.scans.path = text_member(json, "folder");
+    map.scans.recursive = json.value("recursive", false);
     map.islands.resize(list_member(json, "islands").size());
     if (map.islands.empty()) throw InvalidArgument("no scan was placed");
     for (const Json& scan : list_member(json, "scans")) add_scan(scan, map);
@@ -60,28 +70,35 @@ SavedMap read_saved_map(const std::string& file) {
     throw IoError(file + ": " + error.what());
   }
   // The folder was named from where `reconstruct` ran.
-  if (!fs::is_directory(map.scans)) {
-    const fs::path beside =
-        fs::absolute(file).parent_path().parent_path() / fs::path(map.scans).filename();
-    if (fs::is_directory(beside)) map.scans = beside.string();
+  if (!map.scans.exists()) {
+    const ScanInput beside =
+        map.scans.beside(fs::absolute(file).parent_path().parent_path().string());
+    if (beside.exists()) map.scans = beside;
   }
   return map;
 }
 
 reconstruction::Reconstruction read_map_poses(const std::string& path,
-                                              const std::vector<int>& numbers,
+                                              const std::vector<io::ScanFile>& scans,
                                               const std::string& folder) {
   const std::string file = saved_map_file(path);
   if (file.empty()) {
     if (std::error_code ignored; fs::is_directory(path, ignored))
       throw IoError(path + " has no reconstruction.json" + kWrittenLast);
-    return read_pose_file(path, numbers, folder);
+    return read_pose_file(path, scans, folder);
   }
   const SavedMap saved = read_saved_map(file);
-  std::map<std::int64_t, std::uint32_t> island;
+  std::map<int, std::uint32_t> saved_island;
   for (std::uint32_t k = 0; k < saved.islands.size(); ++k)
-    for (const int number : saved.islands[k]) island[number] = k;
-  return map_of({saved.poses.begin(), saved.poses.end()}, island, numbers, file, folder);
+    for (const int number : saved.islands[k]) saved_island[number] = k;
+  PosesByNumber poses;
+  std::map<std::int64_t, std::uint32_t> island;
+  for (const io::ScanFile& scan : scans)
+    if (const auto number = saved.number_of(scan)) {
+      poses[scan.number] = saved.poses.at(*number);
+      island[scan.number] = saved_island.at(*number);
+    }
+  return map_of(poses, island, scans, file, folder);
 }
 
 }  // namespace gpureg::cli

@@ -2,20 +2,26 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "gpureg/reconstruction/map.hpp"
+#include "inputs/scan_input.hpp"
 
 namespace gpureg::cli {
 
 /// What `gpureg reconstruct` wrote, as far as other verbs read it: all from reconstruction.json, so
 /// that nothing of another run gets in.
 struct SavedMap {
-  std::string file;                          ///< its reconstruction.json
-  std::string scans;                         ///< folder of the scans
+  std::string file;  ///< its reconstruction.json
+  ScanInput scans;
   std::vector<std::vector<int>> islands;     ///< numbers of fragments, the largest island first
   std::map<int, UnalignedIsometry3d> poses;  ///< of fragments, in the frames of their islands
+  std::map<std::string, int> numbers;        ///< of scans, by their names
+
+  /// The number that a scan had; others may have come and gone since. None: it is not in the map.
+  std::optional<int> number_of(const io::ScanFile& scan) const;
 };
 
 /// For messages about a folder without one.
@@ -33,7 +39,7 @@ SavedMap read_saved_map(const std::string& file);
 /// islands; or that of read_pose_file(), whose parameters these are.
 /// @throws IoError as read_pose_file(), also for a folder of an unfinished `gpureg reconstruct`.
 reconstruction::Reconstruction read_map_poses(const std::string& path,
-                                              const std::vector<int>& numbers,
+                                              const std::vector<io::ScanFile>& scans,
                                               const std::string& folder);
 
 }  // namespace gpureg::cli

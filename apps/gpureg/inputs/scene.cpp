@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -39,37 +38,25 @@ void mix(std::uint64_t& hash, const std::vector<Eigen::Vector3f>& rows) {
   }
 }
 
-using Fragments = std::vector<std::pair<int, std::string>>;
+using Fragments = std::vector<io::ScanFile>;
 using Cameras = std::map<int, std::vector<Eigen::Vector3d>>;
 
 // A file that covers half of the scene works, but hardly as meant.
 void note_gaps(const Fragments& fragments, const Cameras& cameras, const std::string& file) {
   std::size_t covered = 0;
-  for (const auto& [number, path] : fragments) covered += cameras.count(number);
+  for (const io::ScanFile& scan : fragments) covered += cameras.count(scan.number);
   const std::size_t lacking = fragments.size() - covered, strangers = cameras.size() - covered;
   if (lacking > 0)
     std::cerr << "gpureg: note: " << lacking << " of " << fragments.size()
               << " fragments have no camera in " << file << std::endl;
   for (auto at = cameras.begin(); strangers > 0 && at != cameras.end(); ++at)
     if (std::none_of(fragments.begin(), fragments.end(),
-                     [&](const auto& fragment) { return fragment.first == at->first; })) {
+                     [&](const io::ScanFile& scan) { return scan.number == at->first; })) {
       std::cerr << "gpureg: note: " << file << " has cameras of fragment " << at->first
                 << (strangers > 1 ? " and " + std::to_string(strangers - 1) + " more" : "")
                 << ", which the folder lacks" << std::endl;
       return;
     }
-}
-
-// Of the pair that was read as the k-th from 0: lines without fields do not count.
-std::size_t line_of_pair(const std::string& path, std::size_t k) {
-  std::ifstream file(path);
-  std::size_t number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
-    const std::size_t field = line.find_first_not_of(" \t\r");
-    if (field != std::string::npos && line[field] != '#' && k-- == 0) break;
-  }
-  return number;
 }
 
 std::uint64_t hash_of(const PointCloud& cloud) {
@@ -99,7 +86,7 @@ std::vector<Prepared> prepare_usable(const Context& context, const FragmentFolde
   for (std::size_t k = 0; k < clouds.size(); ++k) {
     views.push_back(clouds[k].view());
     views.back().infer_viewpoint = infer_viewpoint || !clouds[k].viewpoints.empty();
-    names.push_back(folder.files[places[k]]);
+    names.push_back(folder.scans[places[k]].path);
   }
   std::vector<Prepared> out;
   try {
@@ -118,17 +105,21 @@ std::vector<Prepared> prepare_usable(const Context& context, const FragmentFolde
 
 }  // namespace
 
-FragmentFolder::FragmentFolder(const std::string& path, bool quiet) {
-  const Fragments fragments = io::list_fragments(path);
-  for (const auto& [number, file] : fragments) {
-    numbers.push_back(number);
-    files.push_back(file);
-    count_ = number + 1;
-  }
-  const std::string cameras_file = (std::filesystem::path(path) / "cameras.txt").string();
+FragmentFolder::FragmentFolder(const ScanInput& input, bool quiet) : scans(input.list(quiet)) {
+  for (const io::ScanFile& scan : scans) numbers.push_back(scan.number);
+  count_ = numbers.back() + 1;
+  const std::string cameras_file = (std::filesystem::path(input.folder()) / "cameras.txt").string();
   if (!std::filesystem::exists(cameras_file)) return;
-  cameras_ = io::read_cameras(cameras_file);
-  if (!quiet) note_gaps(fragments, cameras_, cameras_file);
+  cameras_ = io::read_cameras(cameras_file, scans);
+  if (!quiet) note_gaps(scans, cameras_, cameras_file);
+}
+
+std::vector<io::ScanFile> FragmentFolder::all() const {
+  std::vector<io::ScanFile> out = scans;
+  for (const UnusableFragment& fragment : unusable) out.push_back(fragment.scan);
+  std::sort(out.begin(), out.end(),
+            [](const io::ScanFile& a, const io::ScanFile& b) { return a.number < b.number; });
+  return out;
 }
 
 bool FragmentFolder::has(int number) const {
@@ -141,38 +132,38 @@ std::uint32_t FragmentFolder::index_of(int number) const {
 }
 
 PointCloud FragmentFolder::read(std::size_t k, double spacing, MeshNote note) const {
-  PointCloud cloud = read_cloud(files[k], spacing, note);
+  PointCloud cloud = read_cloud(scans[k].path, spacing, note);
   if (const auto found = cameras_.find(numbers[k]); found != cameras_.end())
     cloud.set_viewpoints(found->second);
   return cloud;
 }
 
 bool FragmentFolder::is_unusable(int number) const {
-  return std::any_of(unusable.begin(), unusable.end(),
-                     [&](const UnusableFragment& fragment) { return fragment.number == number; });
+  return std::any_of(unusable.begin(), unusable.end(), [&](const UnusableFragment& fragment) {
+    return fragment.scan.number == number;
+  });
 }
 
 void FragmentFolder::leave_out(const std::map<std::size_t, std::string>& reasons) {
   if (reasons.empty()) return;
   if (numbers.size() - reasons.size() < 2) throw IoError(reasons.begin()->second);
   std::vector<int> kept_numbers;
-  std::vector<std::string> kept_files;
+  std::vector<io::ScanFile> kept_scans;
   for (std::size_t k = 0; k < numbers.size(); ++k)
     if (const auto found = reasons.find(k); found != reasons.end()) {
-      unusable.push_back({numbers[k], files[k], found->second});
-      std::cerr << "gpureg: fragment " << numbers[k] << " is left out: " << found->second
-                << std::endl;
+      std::cerr << "gpureg: " << titled(scans[k]) << " is left out: " << found->second << std::endl;
+      unusable.push_back({std::move(scans[k]), found->second});
     } else {
       kept_numbers.push_back(numbers[k]);
-      kept_files.push_back(std::move(files[k]));
+      kept_scans.push_back(std::move(scans[k]));
     }
   numbers = std::move(kept_numbers);
-  files = std::move(kept_files);
+  scans = std::move(kept_scans);
 }
 
 void FragmentFolder::leave_out_unreadable() {
   std::map<std::size_t, std::string> reasons;
-  for (std::size_t k = 0; k < files.size() && !InterruptGuard::requested(); ++k) try {
+  for (std::size_t k = 0; k < scans.size() && !InterruptGuard::requested(); ++k) try {
       read(k, 0, MeshNote::none);
     } catch (const IoError& error) {
       reasons[k] = error.what();
@@ -182,13 +173,13 @@ void FragmentFolder::leave_out_unreadable() {
 
 std::vector<std::pair<std::string, std::size_t>> PreparedFolder::prepared_sizes() const {
   std::vector<std::pair<std::string, std::size_t>> out;
-  for (std::size_t k = 0; k < files.size(); ++k) out.emplace_back(files[k], clouds[k].size());
+  for (std::size_t k = 0; k < scans.size(); ++k) out.emplace_back(scans[k].path, clouds[k].size());
   return out;
 }
 
-PreparedFolder prepare_folder(const Context& context, const std::string& path,
+PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
                               const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
-  PreparedFolder folder{FragmentFolder(path, quiet)};
+  PreparedFolder folder{FragmentFolder(input, quiet)};
   const std::size_t size = folder.numbers.size();
   std::map<std::size_t, std::string> bad;
   ViewpointNote viewpoints;
@@ -210,7 +201,7 @@ PreparedFolder prepare_folder(const Context& context, const std::string& path,
         continue;
       }
       places.push_back(next);
-      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), folder.files[next]);
+      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), folder.scans[next].path);
       points += chunk.back().points.size();
     }
     const auto prepared = prepare_usable(context, folder, chunk, places, options, infer_viewpoint);
@@ -241,22 +232,13 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Fragment
       for (std::uint32_t j = i + 1; j < size; ++j) chosen.emplace_back(i, j);
     return chosen;
   }
-  const auto listed = io::read_pairs(pairs);
-  std::size_t k = 0;
-  const auto index_of = [&](int number) {
-    const auto at = std::lower_bound(folder.numbers.begin(), folder.numbers.end(), number);
-    if (folder.is_unusable(number)) return std::optional<std::uint32_t>();
-    if (at == folder.numbers.end() || *at != number)
-      throw IoError(pairs + ":" + std::to_string(line_of_pair(pairs, k)) +
-                    ": there is no fragment " + std::to_string(number));
-    return std::optional(static_cast<std::uint32_t>(at - folder.numbers.begin()));
-  };
+  const auto listed = io::read_pairs(pairs, folder.all());
   std::size_t repeated = 0;
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
-  for (; k < listed.size(); ++k) {
-    const auto i = index_of(listed[k].first), j = index_of(listed[k].second);
-    if (!i || !j) continue;
-    const std::pair<std::uint32_t, std::uint32_t> pair = std::minmax(*i, *j);
+  for (const auto& [i, j] : listed) {
+    if (!folder.has(i) || !folder.has(j)) continue;  // unusable
+    const std::pair<std::uint32_t, std::uint32_t> pair =
+        std::minmax(folder.index_of(i), folder.index_of(j));
     if (seen.insert(pair).second)
       chosen.push_back(pair);
     else
@@ -268,8 +250,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Fragment
   return chosen;
 }
 
-void check_pairs(const std::string& folder, const std::string& pairs) {
-  if (choose_pairs(FragmentFolder(folder, true), pairs, true).empty() && pairs != "all")
+void check_pairs(const ScanInput& input, const std::string& pairs) {
+  if (choose_pairs(FragmentFolder(input, true), pairs, true).empty() && pairs != "all")
     throw InvalidArgument(pairs + " lists no pair");
 }
 

@@ -10,27 +10,31 @@
 
 #include "gpureg/registration.hpp"
 #include "inputs/cloud_file.hpp"
+#include "inputs/scan_input.hpp"
 
 namespace gpureg::cli {
 
 /// A fragment that cannot be read or prepared. It costs its own pairs; the others are as if it were
 /// not in the folder.
 struct UnusableFragment {
-  int number = 0;
-  std::string file, reason;
+  io::ScanFile scan;
+  std::string reason;
 };
 
-/// The clouds of a folder, cloud_bin_<i>, and their sensor positions of cameras.txt.
+/// The scans of a folder, a list or a pattern, and their sensor positions of cameras.txt.
 class FragmentFolder {
  public:
   FragmentFolder() = default;
-  /// @param quiet does not say where cameras.txt and the fragments do not match.
+  /// @param quiet does not say what was skipped, and where cameras.txt and the scans do not match.
   /// @throws IoError.
-  FragmentFolder(const std::string& path, bool quiet);
+  FragmentFolder(const ScanInput& input, bool quiet);
 
-  std::vector<int> numbers;  ///< as in the file names, ascending
-  std::vector<std::string> files;
+  std::vector<int> numbers;  ///< ascending
+  std::vector<io::ScanFile> scans;
   std::vector<UnusableFragment> unusable;  ///< in neither of the two any more
+
+  /// All that were there, the unusable ones too, ascending.
+  std::vector<io::ScanFile> all() const;
 
   /// What Redwood's files give as the number of fragments; larger than the number of files where
   /// numbers are missing.
@@ -74,13 +78,13 @@ struct PreparedFolder : FragmentFolder {
 /// Reads and prepares all fragments, and says on stderr which are left out as unusable.
 /// infer_viewpoint: of fragments without a sensor position, see PointCloudView. Throws IoError,
 /// also where unusable fragments leave less than a pair.
-PreparedFolder prepare_folder(const Context& context, const std::string& path,
+PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
                               const PrepareOptions& options, bool quiet,
                               bool infer_viewpoint = true);
 
 /// Reads cameras.txt and a list of pairs before the clouds are read. Throws IoError as
 /// choose_pairs(), InvalidArgument for a list without a pair.
-void check_pairs(const std::string& folder, const std::string& pairs);
+void check_pairs(const ScanInput& input, const std::string& pairs);
 
 /// Pairs i < j as indices into numbers, in the file's order without repetitions, or all of them for
 /// "all". Pairs of unusable fragments are left out. Unless quiet, says how many are repetitions.

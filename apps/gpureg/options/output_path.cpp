@@ -13,6 +13,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
 #include "inputs/map_input.hpp"
+#include "inputs/scan_input.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -40,6 +41,8 @@ void refuse_same(const NamedPath& output, const NamedPath& other) {
 }
 
 void check_input(const NamedPath& input) {
+  // Who lists the files of a pattern says what is wrong with it.
+  if (ScanInput::is_pattern(input.path)) return;
   if (input.path.empty() || ::access(io::scan_path(input.path).file.c_str(), R_OK) == 0) return;
   throw IoError(input.name + ": cannot read " + input.path + ": " +
                 std::generic_category().message(errno));
@@ -47,9 +50,9 @@ void check_input(const NamedPath& input) {
 
 constexpr const char* kReconstruction = "reconstruction.json";
 constexpr const char* kTruth[] = {"cameras.txt", "gt.log", "gt.info", "gt_all.log", "gt_all.info"};
-constexpr const char* kMap[] = {"poses.txt",  "trajectory.txt", "edges.log",
-                                "graph.g2o",  "map.ply",        "map.html",
-                                "pairs.json", "pairs.journal",  kReconstruction};
+constexpr const char* kMap[] = {"poses.txt",     "trajectory.txt", "edges.log", "graph.g2o",
+                                "map.ply",       "map.html",       "scans.csv", "pairs.json",
+                                "pairs.journal", kReconstruction};
 
 /// "poses.txt" of "poses_1.txt", the file of a further island.
 std::string of_first_island(const std::string& name) {
@@ -81,6 +84,11 @@ std::vector<NamedPath> files_of(const NamedPath& input) {
   std::vector<NamedPath> files = {{input.name, path.string()}};
   std::error_code error;
   const bool is_folder = fs::is_directory(path, error);
+  if (io::names_scans(input.path)) try {
+      for (const io::ScanFile& scan : io::list_scans(input.path))
+        files.push_back({input.name, scan.path});
+    } catch (const Error&) {
+    }
   if (is_folder) add_folder(input.name, path, files);
   const fs::path reconstruction = is_folder ? path / kReconstruction : path;
   if (reconstruction.filename() != kReconstruction || !fs::exists(reconstruction, error))
@@ -88,7 +96,7 @@ std::vector<NamedPath> files_of(const NamedPath& input) {
   if (!is_folder)
     add_folder(input.name, path.parent_path().empty() ? "." : path.parent_path(), files);
   try {
-    add_folder(input.name, scans_of_reconstruction(reconstruction.string()), files);
+    add_folder(input.name, scans_of_reconstruction(reconstruction.string()).folder(), files);
   } catch (const Error&) {  // whoever reads it says what is wrong with it
   }
   return files;

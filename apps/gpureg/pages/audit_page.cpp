@@ -161,7 +161,7 @@ std::string map_picture(const AuditRun& run, const reconstruction::Island& islan
   }
   for (const std::uint32_t k : island.scans) {
     drawing.dots({centres[k]}, broken.count(k) ? "#d6453d" : "#22221f", 6);
-    drawing.label(centres[k], std::to_string(run.scene.numbers[k]));
+    drawing.label(centres[k], escaped(label(run.scene.scans[k])));
   }
   return drawing.text();
 }
@@ -210,7 +210,7 @@ std::string audit_page(const AuditRun& run) {
       << "border:1px solid #e2e2dc;max-width:100%}svg text{font-size:10px}.bad{color:#d6453d}"
       << ".good{color:#2f9e5b}figure{display:inline-block;width:430px;margin:8px 6px}</style>"
       << "</head><body><h1 class='" << class_of(verdict) << "'>" << title_of(verdict) << "</h1><p>"
-      << escaped(run.poses_file) << ", scans of " << escaped(run.folder) << "</p>";
+      << escaped(run.poses_file) << ", scans of " << escaped(run.input.path) << "</p>";
   std::vector<std::size_t> worst;
   for (const auto& connection : run.audit.connections) {
     if (connection.verdict != ConnectionVerdict::contradicted) continue;
@@ -228,7 +228,7 @@ std::string audit_page(const AuditRun& run) {
     if (run.audit.islands[k].scans.empty()) continue;
     if (verdicts.size() > 1)
       out << "<h2 class='" << class_of(verdicts[k]) << "'>Island " << k << ", "
-          << island_scans(run, k) << ": " << to_string(verdicts[k]) << "</h2>";
+          << escaped(island_scans(run, k)) << ": " << to_string(verdicts[k]) << "</h2>";
     out << map_picture(run, run.audit.islands[k]);
   }
   std::stable_sort(worst.begin(), worst.end(), [&](std::size_t a, std::size_t b) {
@@ -239,8 +239,9 @@ std::string audit_page(const AuditRun& run) {
            "other looked through.</p>";
   for (std::size_t k = 0; k < std::min(kPictures, worst.size()); ++k) {
     const AuditedPair& pair = run.audit.pairs[worst[k]];
-    out << "<figure>" << pair_picture(run, pair) << "<figcaption>" << run.scene.numbers[pair.target]
-        << " and " << run.scene.numbers[pair.source] << ": " << fixed(100 * pair.violation, 0)
+    out << "<figure>" << pair_picture(run, pair) << "<figcaption>"
+        << escaped(label(run.scene.scans[pair.target])) << " and "
+        << escaped(label(run.scene.scans[pair.source])) << ": " << fixed(100 * pair.violation, 0)
         << " % in free space, overlap " << fixed(100 * pair.overlap, 0)
         << " %</figcaption></figure>";
   }

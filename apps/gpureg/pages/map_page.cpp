@@ -136,7 +136,7 @@ Json scans_json(const MapRun& run, const PagePoints& points) {
   for (std::size_t k = 0; k < run.map.scans.size(); ++k) {
     const reconstruction::Scan& scan = run.map.scans[k];
     const bool plain = scan.reason == reconstruction::ScanReason::none;
-    out.push_back({{"id", run.scene.numbers[k]},
+    out.push_back({{"name", label(run.scene.scans[k])},
                    {"island", scan.placed ? Json(scan.island) : Json(nullptr)},
                    {"confidence", scan.confidence},
                    {"reason", plain ? "" : reconstruction::describe(scan.reason)},
@@ -257,7 +257,7 @@ void write_map_page(const MapRun& run, const std::vector<Surface>& surfaces) {
     text.replace(at, 1, "\\u003c");
   files::write_atomically(
       run.file("map.html"),
-      filled(kMapPageHtml, {{"title", "gpureg map: " + escaped(base_name(run.folder))},
+      filled(kMapPageHtml, {{"title", "gpureg map: " + escaped(base_name(run.input.path))},
                             {"script", kMapPageScript},
                             {"data", text}}));
 }

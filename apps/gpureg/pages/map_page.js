@@ -340,6 +340,7 @@ function list(title, entries, none, folded) {
     for (const [tag, text] of [['b', e.name], ['span', e.text], ['em', e.value]]) {
       const part = document.createElement(tag);
       part.textContent = text;
+      if (tag === 'b') part.title = text;
       if (tag === 'em') part.style.color = e.colour || '';
       li.append(part);
     }
@@ -366,11 +367,11 @@ function choose(entry, li) {
   redraw();
 }
 function showLists() {
-  const name = (k) => String(data.scans[k].id);
+  const name = (k) => data.scans[k].name;
   const value = (c) => ({value: probability(c), colour: css(confidenceColour(c).map((v) => 0.8 * v))});
-  list('Scans left out', data.scans.flatMap((s, k) => s.island === null ? [{name: s.id, text: s.reason,
-    value: '', choice: {kind: 'scan', scan: k}, tip: `scan ${s.id}: ${s.reason}`}] : []), 'None.');
-  const noted = data.scans.flatMap((s, k) => s.island !== null && s.reason ? [{name: s.id, text: s.reason,
+  list('Scans left out', data.scans.flatMap((s, k) => s.island === null ? [{name: s.name, text: s.reason,
+    value: '', choice: {kind: 'scan', scan: k}, tip: `scan ${s.name}: ${s.reason}`}] : []), 'None.');
+  const noted = data.scans.flatMap((s, k) => s.island !== null && s.reason ? [{name: s.name, text: s.reason,
     value: '', choice: {kind: 'scan', scan: k}, tip: s.reason}] : []);
   if (noted.length) list('Scans without confirmation', noted);
   list('Weakest connections', data.links.map((l) => ({name: l.scans.length > 4 ? `${l.scans.slice(0, 2).map(name).join(', ')} and ${l.scans.length - 2} more` : l.scans.map(name).join(', '),
@@ -381,8 +382,8 @@ function showLists() {
       tip: `blue: scan ${name(e.i)}, yellow: scan ${name(e.j)}` + (e.moved ? ', red: the scan where this edge puts it' : '')}));
   list('Rejected edges', edges(false), 'None.');
   list('Accepted edges, the least confident first', edges(true), 'None.', true);
-  list('Scans', data.scans.flatMap((s, k) => s.island === null ? [] : [{name: s.id, text: '', ...value(s.confidence),
-    choice: {kind: 'scan', scan: k}, tip: `scan ${s.id} and its edges`}]), 'None.', true);
+  list('Scans', data.scans.flatMap((s, k) => s.island === null ? [] : [{name: s.name, text: '', ...value(s.confidence),
+    choice: {kind: 'scan', scan: k}, tip: `scan ${s.name} and its edges`}]), 'None.', true);
 }
 function showLegend() {
   const legend = element('legend');

@@ -17,16 +17,16 @@ constexpr std::size_t kThresholds = 200;  // more points than a plot of 460 pixe
 
 bool higher_score(const PairRecord* a, const PairRecord* b) { return a->score > b->score; }
 
-std::string numbers(const PairRecord& pair) {
-  return "fragment " + std::to_string(pair.j) + " onto " + std::to_string(pair.i) + ", score " +
+std::string names(const ResultFile& result, const PairRecord& pair) {
+  return result.title_of(pair.j) + " onto " + result.label_of(pair.i) + ", score " +
          fixed(pair.score, 2);
 }
 
-void take(std::vector<SamplePair>& samples, const std::vector<const PairRecord*>& pairs,
-          std::size_t each, const std::string& heading,
+void take(std::vector<SamplePair>& samples, const ResultFile& result,
+          const std::vector<const PairRecord*>& pairs, std::size_t each, const std::string& heading,
           const std::function<std::string(const PairRecord&)>& remark) {
   for (std::size_t k = 0; k < std::min(each, pairs.size()); ++k)
-    samples.push_back({pairs[k], heading, numbers(*pairs[k]) + remark(*pairs[k])});
+    samples.push_back({pairs[k], heading, names(result, *pairs[k]) + remark(*pairs[k])});
 }
 
 // The median score first, then the lowest one. pairs: sorted by falling score.
@@ -88,7 +88,8 @@ std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth
   return curve;
 }
 
-std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std::size_t each) {
+std::vector<SamplePair> samples(const ResultFile& result,
+                                const std::vector<EvaluatedPair>& evaluated, std::size_t each) {
   std::vector<const PairRecord*> correct, false_positive, missed;
   std::map<const PairRecord*, bool> candidate_correct;
   for (const EvaluatedPair& e : evaluated) {
@@ -101,9 +102,9 @@ std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std
   for (auto* pairs : {&correct, &false_positive, &missed})
     std::sort(pairs->begin(), pairs->end(), higher_score);
   std::vector<SamplePair> chosen;
-  take(chosen, median_and_lowest(correct), each, "Correct", no_remark);
-  take(chosen, false_positive, each, "False positive", no_remark);
-  take(chosen, missed, each, "Missed", [&](const PairRecord& pair) {
+  take(chosen, result, median_and_lowest(correct), each, "Correct", no_remark);
+  take(chosen, result, false_positive, each, "False positive", no_remark);
+  take(chosen, result, missed, each, "Missed", [&](const PairRecord& pair) {
     if (!pair.transform) return ": " + pair.reason;
     return ": " + pair.reason + "; the best candidate is " +
            (candidate_correct[&pair] ? "correct" : "false");
@@ -120,7 +121,7 @@ std::vector<SamplePair> samples(const ResultFile& result, std::size_t most) {
   for (std::size_t k = 0; k < count; ++k) {
     const PairRecord& pair = *pairs[count < 2 ? 0 : k * (pairs.size() - 1) / (count - 1)];
     chosen.push_back({&pair, pair.aligned ? "Aligned" : "Not aligned",
-                      numbers(pair) + (pair.aligned ? "" : ": " + pair.reason)});
+                      names(result, pair) + (pair.aligned ? "" : ": " + pair.reason)});
   }
   return chosen;
 }

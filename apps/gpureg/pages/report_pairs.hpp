@@ -32,7 +32,8 @@ struct SamplePair {
 };
 
 /// Correct, false positive and missed pairs, at most `each` of a kind.
-std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std::size_t each);
+std::vector<SamplePair> samples(const ResultFile& result,
+                                const std::vector<EvaluatedPair>& evaluated, std::size_t each);
 /// Without ground truth: at most `most` pairs by falling score, from the first to the last.
 std::vector<SamplePair> samples(const ResultFile& result, std::size_t most);
 

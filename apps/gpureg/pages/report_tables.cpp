@@ -114,8 +114,8 @@ std::string pair_table(const ResultFile& result, const std::vector<PairRow>& row
   for (const std::size_t k : order) {
     const PairRecord& pair = result.pairs[k];
     const PairRow& row = rows[k];
-    std::vector<std::string> texts = {std::to_string(pair.i),
-                                      std::to_string(pair.j),
+    std::vector<std::string> texts = {result.label_of(pair.i),
+                                      result.label_of(pair.j),
                                       row.status,
                                       pair.aligned ? "" : pair.reason,
                                       fixed(pair.score, 3),

@@ -11,9 +11,13 @@
 namespace gpureg::cli {
 namespace {
 
-Json pair_json(const reconstruction::AuditedPair& pair, const std::vector<int>& numbers) {
-  return {{"i", numbers[pair.target]},
-          {"j", numbers[pair.source]},
+using Scans = std::vector<io::ScanFile>;
+
+Json pair_json(const reconstruction::AuditedPair& pair, const Scans& scans) {
+  return {{"i", scans[pair.target].number},
+          {"j", scans[pair.source].number},
+          {"name_i", scans[pair.target].name},
+          {"name_j", scans[pair.source].name},
           {"verdict", to_string(pair.verdict)},
           {"log_likelihood_ratio", pair.log_likelihood_ratio},
           {"overlap", pair.overlap},
@@ -33,39 +37,33 @@ std::vector<std::pair<int, int>> ranges_of(const std::vector<int>& numbers) {
   return out;
 }
 
-std::vector<int> numbers_of(const std::vector<std::uint32_t>& scans,
-                            const std::vector<int>& numbers) {
+std::vector<int> numbers_of(const std::vector<std::uint32_t>& places, const Scans& scans) {
   std::vector<int> out;
-  for (const std::uint32_t scan : scans) out.push_back(numbers[scan]);
+  for (const std::uint32_t k : places) out.push_back(scans[k].number);
   return out;
+}
+
+std::string labels_of(const std::vector<std::uint32_t>& places, const Scans& scans) {
+  Scans of;
+  for (const std::uint32_t k : places) of.push_back(scans[k]);
+  return (of.size() == 1 ? "scan " : "scans ") + labels(of);
 }
 
 }  // namespace
 
-std::string ranges(const std::vector<int>& numbers) {
-  std::ostringstream out;
-  for (const auto& [first, last] : ranges_of(numbers)) {
-    out << (out.tellp() > 0 ? ", " : "") << first;
-    if (last > first) out << (last == first + 1 ? ", " : "-") << last;
-  }
-  return out.str();
-}
-
 std::string island_scans(const AuditRun& run, std::size_t island) {
-  const std::vector<std::uint32_t>& scans = run.audit.islands[island].scans;
-  return (scans.size() == 1 ? "scan " : "scans ") + ranges(numbers_of(scans, run.scene.numbers));
+  return labels_of(run.audit.islands[island].scans, run.scene.scans);
 }
 
 std::string describe(const AuditRun& run, const reconstruction::AuditedConnection& connection) {
   std::ostringstream out;
-  out << (connection.size == 1 ? "scan " : "scans ")
-      << ranges(numbers_of(run.audit.scans_of(connection), run.scene.numbers)) << ": "
+  out << labels_of(run.audit.scans_of(connection), run.scene.scans) << ": "
       << connection.contradicting << (connection.contradicting == 1 ? " pair" : " pairs")
       << " with the other scans contradict, " << connection.supporting << " agree";
   if (connection.contradictions.empty()) return out.str();
   const reconstruction::AuditedPair& worst = run.audit.pairs[connection.contradictions.front()];
-  out << "; worst " << run.scene.numbers[worst.target] << " and " << run.scene.numbers[worst.source]
-      << ": ";
+  out << "; worst " << label(run.scene.scans[worst.target]) << " and "
+      << label(run.scene.scans[worst.source]) << ": ";
   if (worst.violation > 0.1)
     out << fixed(100 * worst.violation, 0) << " % of what should be seen is in free space";
   else
@@ -73,13 +71,13 @@ std::string describe(const AuditRun& run, const reconstruction::AuditedConnectio
   return out.str();
 }
 
-Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numbers) {
+Json audit_json(const reconstruction::Audit& audit, const Scans& scans) {
   Json json;
   json["verdict"] = to_string(audit.verdict());
   json["islands"] = Json::array();
   const std::vector<reconstruction::AuditVerdict> verdicts = audit.verdicts();
   for (std::size_t k = 0; k < verdicts.size(); ++k)
-    json["islands"].push_back({{"scans", ranges_of(numbers_of(audit.islands[k].scans, numbers))},
+    json["islands"].push_back({{"scans", ranges_of(numbers_of(audit.islands[k].scans, scans))},
                                {"verdict", to_string(verdicts[k])}});
   json["connections"] = Json::array();
   json["confirmed"] = audit.count(reconstruction::ConnectionVerdict::confirmed);
@@ -87,9 +85,10 @@ Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numb
     if (connection.verdict == reconstruction::ConnectionVerdict::confirmed) continue;
     Json contradictions = Json::array();
     for (const std::size_t k : connection.contradictions)
-      contradictions.push_back({numbers[audit.pairs[k].target], numbers[audit.pairs[k].source]});
+      contradictions.push_back(
+          {scans[audit.pairs[k].target].number, scans[audit.pairs[k].source].number});
     json["connections"].push_back(
-        {{"scans", ranges_of(numbers_of(audit.scans_of(connection), numbers))},
+        {{"scans", ranges_of(numbers_of(audit.scans_of(connection), scans))},
          {"island", connection.island},
          {"verdict", to_string(connection.verdict)},
          {"confidence", connection.confidence},
@@ -100,7 +99,7 @@ Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numb
   json["pairs"] = Json::array();
   for (const reconstruction::AuditedPair& pair : audit.pairs)
     if (pair.verdict != reconstruction::PairVerdict::silent)
-      json["pairs"].push_back(pair_json(pair, numbers));
+      json["pairs"].push_back(pair_json(pair, scans));
   return json;
 }
 
@@ -108,13 +107,16 @@ Json audit_document(const AuditRun& run, const Context& context) {
   Json json;
   json["gpureg"] = "audit";
   json["environment"] = environment(context);
-  json["folder"] = run.folder;
+  json["folder"] = run.input.path;
   json["poses"] = run.poses_file;
   json["voxel_size"] = run.options.prepare.voxel_size;
   json["seconds"] = run.seconds;
+  json["fragments"] = Json::array();
+  for (const io::ScanFile& scan : run.scene.scans)
+    json["fragments"].push_back({{"number", scan.number}, {"name", scan.name}});
   json["missing"] = run.missing;
   json["near_pairs"] = run.audit.pairs.size();
-  json.update(audit_json(run.audit, run.scene.numbers));
+  json.update(audit_json(run.audit, run.scene.scans));
   return json;
 }
 

@@ -13,7 +13,8 @@ namespace gpureg::cli {
 
 /// Everything that `gpureg audit` knows at its end.
 struct AuditRun {
-  std::string folder, poses_file;
+  ScanInput input;
+  std::string poses_file;
   RegistrationOptions options;
   PreparedFolder scene;
   reconstruction::Reconstruction map;  ///< poses and islands
@@ -21,9 +22,6 @@ struct AuditRun {
   reconstruction::Audit audit;
   double seconds = 0;
 };
-
-/// Numbers as people write them: "3-7, 9".
-std::string ranges(const std::vector<int>& numbers);
 
 /// The scans of an island as people write them.
 std::string island_scans(const AuditRun& run, std::size_t island);
@@ -35,6 +33,6 @@ std::string describe(const AuditRun& run, const reconstruction::AuditedConnectio
 Json audit_document(const AuditRun& run, const Context& context);
 
 /// The audit as it enters other documents: pairs that contradict, and all connections.
-Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numbers);
+Json audit_json(const reconstruction::Audit& audit, const std::vector<io::ScanFile>& scans);
 
 }  // namespace gpureg::cli

@@ -120,6 +120,9 @@ Json pair_verdicts(const evaluation::GroundTruth& truth, const ResultFile& resul
         }
       }
     }
+    if (const auto a = result.names.find(pair.first), b = result.names.find(pair.second);
+        a != result.names.end() && b != result.names.end())
+      json.update({{"name_i", a->second}, {"name_j", b->second}});
     verdicts.push_back(std::move(json));
   }
   return verdicts;

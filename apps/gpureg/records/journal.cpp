@@ -28,6 +28,24 @@ namespace {
                 std::generic_category().message(error));
 }
 
+/// The scan of a header that was there before and is not now, or has another content; empty: none.
+std::string changed_scan(const Json& before, const Json& now) {
+  const auto name_of = [](const Json& scan) {
+    return scan.is_object() ? scan.value("name", std::string()) : std::string();
+  };
+  const Json none = Json::array(), scans = now.value("fragments", none);
+  for (const Json& scan : before.value("fragments", none)) {
+    if (name_of(scan).empty()) continue;
+    const auto same = std::find_if(scans.begin(), scans.end(), [&](const Json& other) {
+      return name_of(other) == name_of(scan);
+    });
+    if (same == scans.end()) return name_of(scan) + " is not there any more";
+    if (same->value("hash", Json()) != scan.value("hash", Json()))
+      return name_of(scan) + " is another cloud than before";
+  }
+  return "";
+}
+
 // Names the first part of the header that is not the same.
 std::string difference(const Json& before, const Json& now, const std::string& name) {
   if (before.is_object() && now.is_object())
@@ -181,9 +199,13 @@ std::size_t Journal::take_up(const HeaderOf& header_of, const Take& take) {
 }
 
 void Journal::take_header(const Json& earlier, const HeaderOf& header_of) {
-  if (const Json now = header_of(&earlier); now != earlier)
-    throw IoError("cannot resume from " + path_ + ": " + difference(earlier, now, "") +
-                  "; call with the same options, or " + kAnew);
+  if (const Json now = header_of(&earlier); now != earlier) {
+    const std::string scan = changed_scan(earlier, now);
+    throw IoError("cannot resume from " + path_ + ": " +
+                  (scan.empty() ? difference(earlier, now, "") + "; call with the same options, or "
+                                : scan + "; put it back, or call ") +
+                  kAnew);
+  }
   earlier_ = earlier.dump();
 }
 

@@ -18,7 +18,8 @@ Json pairs_head(const MapRun& run, const Context& context) {
   json["gpureg"] = "batch";
   json["environment"] = environment(context);
   json["options"] = to_json(run.options);
-  json["folder"] = run.folder;
+  json["folder"] = run.input.path;
+  json["recursive"] = run.input.recursive;
   json["complete"] = true;
   const double rate =
       run.seconds.align > 0 ? static_cast<double>(run.pairs_in_this_run) / run.seconds.align : 0;
@@ -36,7 +37,8 @@ Json map_document(const MapRun& run, const Context& context) {
   json["gpureg"] = "reconstruct";
   json["environment"] = environment(context);
   json["options"] = to_json(run.options);
-  json["folder"] = run.folder;
+  json["folder"] = run.input.path;
+  json["recursive"] = run.input.recursive;
   json["seconds"] = {{"prepare", run.seconds.prepare},   {"prune", run.seconds.prune},
                      {"align", run.seconds.align},       {"graph", run.seconds.graph},
                      {"surfaces", run.seconds.surfaces}, {"refine", run.seconds.refine},
@@ -62,6 +64,7 @@ Json map_document(const MapRun& run, const Context& context) {
     const reconstruction::Scan& scan = run.map.scans[k];
     json["scans"].push_back(
         {{"id", run.scene.numbers[k]},
+         {"name", run.scene.scans[k].name},
          {"placed", scan.placed},
          {"island", scan.placed ? Json(scan.island) : Json(nullptr)},
          {"island_from_scan",
@@ -79,12 +82,14 @@ Json map_document(const MapRun& run, const Context& context) {
                                      {"accepted", link.accepted},
                                      {"rejected", link.rejected}});
   }
-  json["audit"] = run.audit ? audit_json(*run.audit, run.scene.numbers) : Json(nullptr);
+  json["audit"] = run.audit ? audit_json(*run.audit, run.scene.scans) : Json(nullptr);
   json["places_look_alike"] = run.places_look_alike;
   json["edges"] = Json::array();
   for (const reconstruction::Edge& edge : run.map.edges)
     json["edges"].push_back({{"i", run.scene.numbers[edge.target]},
                              {"j", run.scene.numbers[edge.source]},
+                             {"name_i", run.scene.scans[edge.target].name},
+                             {"name_j", run.scene.scans[edge.source].name},
                              {"T_ij", to_json(edge.target_from_source.matrix())},
                              {"confidence", edge.confidence},
                              {"pair_confidence", edge.pair_confidence},
@@ -122,7 +127,7 @@ std::string map_summary(const MapRun& run, const Context& context) {
     out << "note       places look alike: only pairs along the path of the sensor were trusted\n";
   for (std::size_t k = 0; k < run.map.scans.size(); ++k)
     if (run.map.scans[k].reason != reconstruction::ScanReason::none)
-      out << (run.map.scans[k].placed ? "note       " : "left out   ") << run.scene.numbers[k]
+      out << (run.map.scans[k].placed ? "note       " : "left out   ") << label(run.scene.scans[k])
           << ": " << reconstruction::describe(run.map.scans[k].reason) << "\n";
   if (run.refined)
     out << "refined    " << run.refined->pairs << " overlapping pairs, RMS distance "

@@ -12,6 +12,7 @@
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "inputs/cloud_file.hpp"
+#include "records/scan_table.hpp"
 #include "run/interrupt.hpp"
 #include "run/progress.hpp"
 
@@ -125,6 +126,7 @@ void write_poses(const MapRun& run) {
     pose_graph::write_g2o(run.file(file_of_island("graph.g2o", k)), graphs[k]);
   }
   write_edges(run);
+  write_scan_table(run.file("scans.csv"), run.scene.all());
 }
 
 /// One map per island, one scan in memory at a time.
@@ -136,7 +138,7 @@ bool write_merged_maps(MapRun& run, float voxel_size, bool quiet) {
     for (const std::uint32_t scan : run.map.islands[k].scans) {
       if (InterruptGuard::requested()) return false;
       const PointCloud cloud =
-          read_cloud(run.scene.files[scan], mesh_spacing(voxel_size), MeshNote::none);
+          read_cloud(run.scene.scans[scan].path, mesh_spacing(voxel_size), MeshNote::none);
       map.add(cloud.view(), run.map.scans[scan].island_from_scan);
       progress.update(++merged);
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "records/pair_store.hpp"
 
+#include <algorithm>
+
 #include "gpureg/error.hpp"
 #include "json/json_fields.hpp"
 #include "json/json_file.hpp"
@@ -23,11 +25,28 @@ void check_voxel_size_of(const Json& document, const std::string& path, float ex
                           significant(static_cast<double>(voxel_size), 4));
 }
 
-std::uint32_t index_of(const FragmentFolder& folder, int number) {
+/// Of a document whose pairs have names, these tell which scan a number is.
+std::uint32_t index_of(const FragmentFolder& folder, const Json& pair, const char* number_name,
+                       const char* name_name) {
+  const int number = fragment_member(pair, number_name);
+  if (const auto name = pair.find(name_name); name != pair.end() && name->is_string()) {
+    const auto text = name->get<std::string>();
+    for (std::size_t k = 0; k < folder.scans.size(); ++k)
+      if (folder.scans[k].name == text) return static_cast<std::uint32_t>(k);
+    throw InvalidArgument("it names " + text + ", which the folder lacks");
+  }
   if (!folder.has(number))
     throw InvalidArgument("it names fragment " + std::to_string(number) +
                           ", which the folder lacks");
   return folder.index_of(number);
+}
+
+bool is_unusable(const FragmentFolder& folder, const Json& pair, int number,
+                 const char* name_name) {
+  const auto name = pair.find(name_name);
+  if (name == pair.end() || !name->is_string()) return folder.is_unusable(number);
+  return std::any_of(folder.unusable.begin(), folder.unusable.end(),
+                     [&](const UnusableFragment& scan) { return scan.scan.name == *name; });
 }
 
 RegistrationResult stored_result(const Json& json) {
@@ -53,7 +72,9 @@ void write_pairs(const std::string& path, const Json& head, const PairStore& sto
   const auto element = [&](std::size_t n) {
     const Pair& pair = store.pairs[places[n]];
     const RegistrationResult& result = store.results[places[n]];
-    Json json = pair_to_json(folder.numbers[pair.target], folder.numbers[pair.source], result);
+    const io::ScanFile &i = folder.scans[pair.target], &j = folder.scans[pair.source];
+    Json json = {{"i", i.number}, {"j", j.number}, {"name_i", i.name}, {"name_j", j.name}};
+    json.update(pair_to_json(i.number, j.number, result));
     if (with_information && result.has_candidate)
       json["information"] = to_json(result.source_moments.information_redwood());
     return json;
@@ -65,8 +86,10 @@ PairStore read_pairs(const std::string& path, const FragmentFolder& folder, floa
   DocumentFile file(path);
   PairStore store;
   const Json document = read_pairs(file, [&](const PairRecord& pair, Json&& json) {
-    if (folder.is_unusable(pair.i) || folder.is_unusable(pair.j)) return;
-    store.pairs.push_back({index_of(folder, pair.j), index_of(folder, pair.i)});
+    if (is_unusable(folder, json, pair.i, "name_i") || is_unusable(folder, json, pair.j, "name_j"))
+      return;
+    store.pairs.push_back(
+        {index_of(folder, json, "j", "name_j"), index_of(folder, json, "i", "name_i")});
     store.results.push_back(stored_result(json));
   });
   if (document.contains("loop_consistency"))

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "gpureg/error.hpp"
+#include "inputs/scan_input.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -15,15 +15,19 @@ std::string name_of(int i, int j) {
   return "pair " + std::to_string(i) + " " + std::to_string(j) + " ";
 }
 
-// A program that lists fragments says which there are; no pair may name another.
-std::set<int> fragment_numbers(const Json& document) {
-  std::set<int> numbers;
+// A program that lists fragments says which there are; no pair may name another. Names are empty
+// where it has none.
+std::map<int, std::string> fragments_of(const Json& document) {
+  std::map<int, std::string> numbers;
   const auto fragments = document.find("fragments");
   if (fragments == document.end() || !fragments->is_array()) return numbers;
   for (const Json& fragment : *fragments)
     if (fragment.is_object() && fragment.contains("number") &&
         fragment["number"].is_number_integer())
-      numbers.insert(fragment["number"].get<int>());
+      numbers[fragment["number"].get<int>()] =
+          fragment.contains("name") && fragment["name"].is_string()
+              ? fragment["name"].get<std::string>()
+              : std::string();
   return numbers;
 }
 
@@ -39,7 +43,7 @@ class Places {
                             std::to_string(first->second) + "]");
   }
 
-  void check_fragments(const std::string& path, const std::set<int>& numbers) const {
+  void check_fragments(const std::string& path, const std::map<int, std::string>& numbers) const {
     if (numbers.empty()) return;
     for (const auto& [pair, place] : places_)
       for (const int number : {pair.first, pair.second})
@@ -66,8 +70,19 @@ Json read_pairs(DocumentFile& file,
   if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
     throw IoError(file.path() + ": no result of `gpureg batch`, it has no array \"pairs\"");
   document.erase("pairs");
-  places.check_fragments(file.path(), fragment_numbers(document));
+  places.check_fragments(file.path(), fragments_of(document));
   return document;
+}
+
+std::string ResultFile::label_of(int number) const {
+  const auto found = names.find(number);
+  return found == names.end() ? std::to_string(number) : label({number, "", found->second});
+}
+
+std::string ResultFile::title_of(int number) const {
+  const auto found = names.find(number);
+  return found == names.end() ? "fragment " + std::to_string(number)
+                              : titled({number, "", found->second});
 }
 
 double ResultFile::mean_milliseconds() const {
@@ -95,6 +110,8 @@ ResultFile read_result(const std::string& path, const std::function<void(const J
       result.pairs.push_back(pair);
       if (each) each(json);
     });
+    for (auto& [number, name] : fragments_of(result.document))
+      if (!name.empty()) result.names[number] = name;
     for (const PairRecord& pair : result.pairs)
       if (pair.transform)
         result.reports.push_back(

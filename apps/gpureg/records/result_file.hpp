@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,11 @@ struct ResultFile {
   std::vector<evaluation::Report> reports;
   std::vector<evaluation::LogEntry> log;  ///< logs only
   Json document;                          ///< JSON only, without its pairs
+
+  std::map<int, std::string> names;  ///< of scans by number, as far as the document has them
+
+  std::string label_of(int number) const;  ///< what people call a scan
+  std::string title_of(int number) const;  ///< "fragment 12", or the name
 
   double mean_milliseconds() const;          ///< per pair; 0 without pairs
   double mean_prepare_milliseconds() const;  ///< per fragment; 0 where not known

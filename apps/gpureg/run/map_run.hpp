@@ -17,7 +17,8 @@ namespace gpureg::cli {
 
 /// Everything that `gpureg reconstruct` knows at its end, for the files that it writes.
 struct MapRun {
-  std::string folder, output;
+  ScanInput input;
+  std::string output;
   RegistrationOptions options;
   PreparedFolder scene;  ///< without prepared clouds where the pairs come from a file
   PairStore pairs;

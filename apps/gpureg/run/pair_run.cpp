@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <set>
 
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
@@ -21,35 +20,44 @@
 namespace gpureg::cli {
 namespace {
 
-/// Numbers of the fragments that a header names.
-std::set<int> numbers_of(const Json& header) {
-  std::set<int> numbers;
-  if (!header.is_object()) return numbers;
-  for (const Json& fragment : header.value("fragments", Json::array()))
-    numbers.insert(fragment_member(fragment, "number"));
+/// The scans that take part in a run, with the numbers that they have there: those of `earlier`,
+/// where other scans may have come and gone since, which moves numbers that are places.
+using Numbers = std::map<std::size_t, int>;
+
+Numbers numbers_of(const PreparedFolder& scene, const Json* earlier) {
+  Numbers numbers;
+  if (earlier == nullptr) {
+    for (std::size_t k = 0; k < scene.scans.size(); ++k) numbers[k] = scene.numbers[k];
+    return numbers;
+  }
+  if (!earlier->is_object()) return numbers;
+  std::map<std::string, std::size_t> places;
+  for (std::size_t k = 0; k < scene.scans.size(); ++k) places[scene.scans[k].name] = k;
+  for (const Json& fragment : earlier->value("fragments", Json::array()))
+    if (const auto place = places.find(text_member(fragment, "name")); place != places.end())
+      numbers[place->second] = fragment_member(fragment, "number");
   return numbers;
 }
 
-// Backend and threads may change between runs: they do not change results. `among`: only these
-// fragments and the pairs of them, for a run that could not use the others.
+// Backend and threads may change between runs: they do not change results. `numbers`: only these
+// scans and the pairs of them, for a run that could not use the others.
 Json header_of(const RegistrationOptions& options, const std::optional<GravityPrior>& gravity,
-               const PreparedFolder& scene, const Pairs& pairs, const std::set<int>* among) {
-  const auto counts = [&](std::size_t k) {
-    return among == nullptr || among->count(scene.numbers[k]) > 0;
-  };
+               const PreparedFolder& scene, const Pairs& pairs, const Numbers& numbers) {
   std::uint64_t hash = 0, count = 0;
   for (const auto& [i, j] : pairs) {
-    if (!counts(i) || !counts(j)) continue;
-    const auto number = [&](std::size_t k) { return static_cast<std::uint64_t>(scene.numbers[k]); };
-    hash = (hash ^ (number(i) << 32 | number(j))) * 0x9E3779B97F4A7C15ull;
+    const auto a = numbers.find(i), b = numbers.find(j);
+    if (a == numbers.end() || b == numbers.end()) continue;
+    hash = (hash ^
+            (static_cast<std::uint64_t>(a->second) << 32 | static_cast<std::uint64_t>(b->second))) *
+           0x9E3779B97F4A7C15ull;
     ++count;
   }
   Json fragments = Json::array();
-  for (std::size_t k = 0; k < scene.numbers.size(); ++k)
-    if (counts(k))
-      fragments.push_back({{"number", scene.numbers[k]},
-                           {"hash", scene.hashes[k]},
-                           {"viewpoint", to_string(scene.clouds[k].statistics().viewpoint)}});
+  for (const auto& [k, number] : numbers)
+    fragments.push_back({{"number", number},
+                         {"name", scene.scans[k].name},
+                         {"hash", scene.hashes[k]},
+                         {"viewpoint", to_string(scene.clouds[k].statistics().viewpoint)}});
   Json header = {{"gpureg_journal", 3},
                  {"version", GPUREG_VERSION},
                  {"options", to_json(options)},
@@ -69,8 +77,7 @@ std::vector<Pair> sources_and_targets(const Pairs& pairs) {
 
 }  // namespace
 
-void choose_voxel_size(MethodOptions& method, const std::string& folder,
-                       const std::string& journal) {
+void choose_voxel_size(MethodOptions& method, const ScanInput& input, const std::string& journal) {
   if (!method.automatic_voxel_size) return;
   if (!journal.empty()) {
     const Json::json_pointer place("/options/prepare/voxel_size");
@@ -81,18 +88,18 @@ void choose_voxel_size(MethodOptions& method, const std::string& folder,
     }
   }
   constexpr std::size_t kMost = 8;
-  const auto files = io::list_fragments(folder);
-  const std::size_t count = std::min(files.size(), kMost);
+  const std::vector<io::ScanFile> scans = input.list(true);
+  const std::size_t count = std::min(scans.size(), kMost);
   std::vector<PointCloud> clouds;
   for (std::size_t k = 0; k < count; ++k) try {
-      clouds.push_back(read_cloud(files[k * files.size() / count].second, 0, MeshNote::none));
+      clouds.push_back(read_cloud(scans[k * scans.size() / count].path, 0, MeshNote::none));
     } catch (const IoError&) {
       // One that cannot be read is left out of the run, and named there.
       if (k + 1 == count && clouds.empty()) throw;
     }
   std::vector<PointCloudView> views;
   for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
-  method.choose_voxel_size(views, folder);
+  method.choose_voxel_size(views, input.path);
 }
 
 PairRun::PairRun(const PreparedFolder& scene, const Pairs& pairs,
@@ -108,19 +115,26 @@ PairRun::PairRun(const PreparedFolder& scene, const Pairs& pairs,
 }
 
 void PairRun::open_journal(const std::string& path, const Pairs& pairs, Journal::Mode mode) {
-  std::map<std::pair<int, int>, std::size_t> places;
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    places[{scene_.numbers[pairs[k].first], scene_.numbers[pairs[k].second]}] = k;
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> places;
+  for (std::size_t k = 0; k < pairs.size(); ++k) places[{pairs[k].first, pairs[k].second}] = k;
+  std::map<int, std::size_t> scan_of;  // by the numbers of the part of the journal that is read
   const bool found = std::filesystem::exists(path);
   journal_.emplace(
       path,
       [&](const Json* earlier) {
-        const std::set<int> among = earlier != nullptr ? numbers_of(*earlier) : std::set<int>();
-        return header_of(options_, gravity_, scene_, pairs, earlier != nullptr ? &among : nullptr);
+        const Numbers numbers = numbers_of(scene_, earlier);
+        if (earlier != nullptr) {
+          scan_of.clear();
+          for (const auto& [k, number] : numbers) scan_of[number] = k;
+        }
+        return header_of(options_, gravity_, scene_, pairs, numbers);
       },
       mode,
       [&](int i, int j, RegistrationResult&& result) {
-        const auto place = places.find({i, j});
+        const auto a = scan_of.find(i), b = scan_of.find(j);
+        const auto place = a == scan_of.end() || b == scan_of.end()
+                               ? places.end()
+                               : places.find({a->second, b->second});
         if (place == places.end() || store_.done(place->second))
           throw InvalidArgument("pair " + std::to_string(i) + " " + std::to_string(j) +
                                 (place == places.end() ? " is none of this run" : " stands twice"));
@@ -186,15 +200,16 @@ void PairRun::close_journal() {
 std::string unusable_line(const FragmentFolder& scene) {
   std::string line;
   for (const UnusableFragment& fragment : scene.unusable)
-    line += " " + std::to_string(fragment.number);
+    line += (line.empty() ? " " : ", ") + label(fragment.scan);
   return line.empty() ? "" : "unusable  " + line + "\n";
 }
 
 Json unusable_json(const FragmentFolder& scene) {
   Json unusable = Json::array();
   for (const UnusableFragment& fragment : scene.unusable)
-    unusable.push_back({{"number", fragment.number},
-                        {"file", base_name(fragment.file)},
+    unusable.push_back({{"number", fragment.scan.number},
+                        {"name", fragment.scan.name},
+                        {"file", base_name(fragment.scan.path)},
                         {"reason", fragment.reason}});
   return unusable;
 }
@@ -202,7 +217,9 @@ Json unusable_json(const FragmentFolder& scene) {
 Json fragments_json(const PreparedFolder& scene) {
   Json fragments = Json::array();
   for (std::size_t k = 0; k < scene.numbers.size(); ++k) {
-    Json fragment = {{"number", scene.numbers[k]}, {"file", base_name(scene.files[k])}};
+    Json fragment = {{"number", scene.numbers[k]},
+                     {"name", scene.scans[k].name},
+                     {"file", base_name(scene.scans[k].path)}};
     fragment.update(to_json(scene.clouds[k].statistics()));
     fragments.push_back(std::move(fragment));
   }

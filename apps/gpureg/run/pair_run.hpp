@@ -23,7 +23,7 @@ using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
 /// Sets an automatic voxel size to that of some fragments of a folder, evenly chosen: it is the
 /// same for a run that is resumed, whose journal says it, if there is one.
-void choose_voxel_size(MethodOptions& method, const std::string& folder,
+void choose_voxel_size(MethodOptions& method, const ScanInput& input,
                        const std::string& journal = "");
 
 /// Aligns the pairs of a scene, with a journal from which an interrupted run goes on.

@@ -19,6 +19,7 @@
 #include "pages/audit_page.hpp"
 #include "records/audit_document.hpp"
 #include "records/map_files.hpp"
+#include "records/scan_table.hpp"
 #include "run/interrupt.hpp"
 #include "run/pair_run.hpp"
 #include "text.hpp"
@@ -29,7 +30,8 @@ namespace {
 using reconstruction::AuditVerdict;
 
 struct AuditVerbOptions {
-  std::string folder, poses, json, page, mended;
+  ScanInput input;
+  std::string poses, json, page, mended;
   MethodOptions method;
   bool quiet = false;
 };
@@ -96,6 +98,8 @@ int mend(const AuditVerbOptions& o, const Context& context, const AuditRun& run,
             {static_cast<double>(run.scene.numbers[scan]), map.world_from_scan[scan].matrix()});
     evaluation::write_trajectory(files[k], trajectory);
   }
+  if (const std::vector<io::ScanFile> scans = run.scene.all(); !are_numbered(scans))
+    write_scan_table(scan_table_of(o.mended), scans);
   if (!o.quiet)
     std::cout << "mended     " << map.registered << " pairs aligned, " << map.moved.size()
               << " scans moved, " << map.left_out.size() << " left out; "
@@ -117,23 +121,23 @@ int audit_and_mend(const AuditVerbOptions& o, const Context& context, AuditRun& 
 }
 
 int run_audit(const AuditVerbOptions& o) {
-  const std::vector<NamedPath> inputs = {{"SCANS", o.folder}, {"POSES", o.poses}};
+  const std::vector<NamedPath> inputs = {{"SCANS", o.input.path}, {"POSES", o.poses}};
   std::vector<NamedPath> outputs = {{"--json", o.json}, {"--page", o.page}, {"--mend", o.mended}};
   check_outputs(outputs, inputs);
   const InterruptGuard guard;
   const Context context = o.method.context();
   AuditRun run;
-  run.folder = o.folder;
+  run.input = o.input;
   run.poses_file = o.poses;
   run.options = o.method.registration();
   // A bad file shall show before the clouds are read.
-  run.map = read_map_poses(o.poses, FragmentFolder(o.folder, true).numbers, o.folder);
+  run.map = read_map_poses(o.poses, FragmentFolder(o.input, true).scans, o.input.path);
   outputs.pop_back();
   for (const std::string& file : mended_files(o, run.map.islands.size()))
     outputs.push_back({"--mend", file});
   check_outputs(outputs, inputs);
-  run.scene = prepare_folder(context, o.folder, run.options.prepare, o.quiet);
-  if (!run.scene.unusable.empty()) run.map = read_map_poses(o.poses, run.scene.numbers, o.folder);
+  run.scene = prepare_folder(context, o.input, run.options.prepare, o.quiet);
+  if (!run.scene.unusable.empty()) run.map = read_map_poses(o.poses, run.scene.scans, o.input.path);
   for (std::size_t k = 0; k < run.map.scans.size(); ++k)
     if (!run.map.scans[k].placed) run.missing.push_back(run.scene.numbers[k]);
   int status = kInterrupted;
@@ -150,11 +154,12 @@ int run_audit(const AuditVerbOptions& o) {
 void add_audit(CommandLine& line) {
   const auto o = std::make_shared<AuditVerbOptions>();
   Verb verb = line.verb("audit", "Say where a finished map contradicts its own scans");
-  verb.option("SCANS", o->folder, "Folder with cloud_bin_<i>, and perhaps cameras.txt").required();
+  verb.option("SCANS", o->input.path, kScansHelp).required();
+  verb.flag("--recursive", o->input.recursive, kRecursiveHelp);
   verb.option(
           "POSES", o->poses,
           "Output folder of `gpureg reconstruct`, or poses of the scans: poses.txt, a trajectory "
-          "(TUM with fragment numbers as times, KITTI), a Redwood log, or g2o")
+          "(TUM with numbers or names of scans as times, KITTI), a Redwood log, or g2o")
       .required();
   verb.option("--json", o->json, "Write every verdict");
   verb.option("--page", o->page, "Write a page (HTML) that shows where the map is broken");
@@ -168,7 +173,7 @@ void add_audit(CommandLine& line) {
     o->method.refuse({"--min-score"}, "in an audit: connections have verdicts of their own");
     if (o->mended.empty())
       o->method.refuse({"--seed", "--quality"}, "without --mend: no pair is aligned");
-    choose_voxel_size(o->method, o->folder);
+    choose_voxel_size(o->method, o->input);
     return run_audit(*o);
   });
 }

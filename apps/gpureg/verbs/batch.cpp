@@ -21,6 +21,7 @@
 #include "records/journal.hpp"
 #include "records/pair_store.hpp"
 #include "records/result_json.hpp"
+#include "records/scan_table.hpp"
 #include "run/interrupt.hpp"
 #include "run/pair_run.hpp"
 #include "run/spacing.hpp"
@@ -30,7 +31,8 @@ namespace gpureg::cli {
 namespace {
 
 struct BatchOptions {
-  std::string folder, pairs = "all";
+  ScanInput input;
+  std::string pairs = "all";
   MethodOptions method;
   ViewpointChoice viewpoint;  // of clouds without cameras: auto or none
   std::string up;
@@ -53,7 +55,7 @@ bool can_have_journal(const std::string& path) {
 void check_batch_outputs(const BatchOptions& o) {
   std::vector<NamedPath> outputs = {{"-o", o.log}, {"--info", o.info}, {"--json", o.json}};
   if (can_have_journal(o.log)) outputs.push_back({"the journal of -o", o.journal()});
-  check_outputs(outputs, {{"DIR", o.folder},
+  check_outputs(outputs, {{"SCANS", o.input.path},
                           {"--pairs", o.pairs == "all" ? "" : o.pairs},
                           {"--calibration", o.method.calibration}});
 }
@@ -69,8 +71,8 @@ class Batch {
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
     if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
     const InterruptGuard guard;
-    scene_ = prepare_folder(context_, o_.folder, options_.prepare, o_.quiet,
-                            o_.viewpoint.text != "none");
+    scene_ =
+        prepare_folder(context_, o_.input, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
     if (scene_.interrupted) {
       std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
       return kInterrupted;
@@ -78,7 +80,9 @@ class Batch {
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
     if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
     const Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
-    if (pairs.empty()) throw InvalidArgument(o_.folder + " holds one fragment; a batch needs two");
+    if (pairs.empty())
+      throw InvalidArgument(o_.input.path + " holds one scan, " + scene_.scans[0].name +
+                            "; a batch needs two");
     std::optional<std::string> journal;
     if (can_have_journal(o_.log)) journal = o_.journal();
     run_.emplace(scene_, pairs, options_, up_prior(o_.up), journal, o_.journal_mode(), o_.quiet);
@@ -98,6 +102,8 @@ class Batch {
     for (const std::string& path : {o_.log, o_.info, o_.json})
       if (std::filesystem::is_regular_file(path)) kept_.insert(path);
   }
+  /// A log has numbers alone.
+  bool has_table() const { return can_have_journal(o_.log) && !are_numbered(scene_.all()); }
   bool may_write(const std::string& path) const {
     return !path.empty() && (run_->complete() || kept_.count(path) == 0);
   }
@@ -118,6 +124,7 @@ class Batch {
     }
     aligned_ = log.size();
     if (may_write(o_.log)) evaluation::write_log(o_.log, log);
+    if (may_write(o_.log) && has_table()) write_scan_table(scan_table_of(o_.log), scene_.all());
     if (may_write(o_.info)) evaluation::write_information(o_.info, information);
     if (may_write(o_.json)) write_pairs(o_.json, head(), run_->store(), scene_, false);
   }
@@ -128,7 +135,8 @@ class Batch {
     json["gpureg"] = "batch";
     json["environment"] = environment(context_);
     json["options"] = to_json(options_);
-    json["folder"] = o_.folder;
+    json["folder"] = o_.input.path;
+    json["recursive"] = o_.input.recursive;
     json["complete"] = run_->complete();
     json["seconds"] = {{"prepare", scene_.seconds},
                        {"align", run_->seconds()},
@@ -161,6 +169,8 @@ class Batch {
                 << fixed(run_->seconds(), 2) << " s (" << significant(run_->rate(), 3)
                 << " pairs/s, " << context_.description() << ")\n"
                 << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
+      if (has_table())
+        std::cout << "names      of the numbers in the log: " << scan_table_of(o_.log) << "\n";
       for (const auto& [reason, count] : reasons_)
         std::cout << "not        " << count << ", " << reason << "\n";
       std::cout << "memory     " << fixed(peak_memory_mib(), 0) << " MiB at most\n";
@@ -183,12 +193,10 @@ class Batch {
 
 void add_batch(CommandLine& line) {
   const auto o = std::make_shared<BatchOptions>();
-  Verb verb = line.verb("batch", "Align the fragments cloud_bin_<i> of a folder");
-  verb.option(
-          "DIR", o->folder,
-          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
-      .required();
-  verb.option("--pairs", o->pairs, "all, or a file with one pair `i j` a line").show_default();
+  Verb verb = line.verb("batch", "Align the scans of a folder, each with each");
+  verb.option("SCANS", o->input.path, kScansHelp).required();
+  verb.flag("--recursive", o->input.recursive, kRecursiveHelp);
+  verb.option("--pairs", o->pairs, kPairsHelp).show_default();
   o->method.add_to(verb);
   o->method.add_calibration_to(verb);
   verb.option("--viewpoint", o->viewpoint.text,
@@ -199,7 +207,11 @@ void add_batch(CommandLine& line) {
   verb.option("--up", o->up,
               "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
               "be off (without: 10): 0,0,1,5");
-  verb.option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i").required();
+  verb.option("-o,--output", o->log,
+              "Redwood log of the aligned pairs: T_ij, j into i; the names of the numbers beside "
+              "it, in "
+              "OUTPUT_scans.csv")
+      .required();
   verb.option("--info", o->info, "Redwood information matrices of the same pairs");
   verb.option("--json", o->json, "Everything about every pair tried");
   const Option resume =
@@ -211,8 +223,8 @@ void add_batch(CommandLine& line) {
     o->method.registration();  // reports bad options before the clouds are read
     up_prior(o->up);
     check_batch_outputs(*o);
-    check_pairs(o->folder, o->pairs);
-    choose_voxel_size(o->method, o->folder, o->resume ? o->journal() : "");
+    check_pairs(o->input, o->pairs);
+    choose_voxel_size(o->method, o->input, o->resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Batch(*o).run();
   });

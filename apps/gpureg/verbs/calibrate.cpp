@@ -29,7 +29,8 @@ namespace gpureg::cli {
 namespace {
 
 struct CalibrateOptions {
-  std::string folder, output, trajectory;
+  ScanInput input;
+  std::string output, trajectory;
   MethodOptions method;
   CalibrationOptions calibration;
   std::optional<double> max_risk;
@@ -50,14 +51,15 @@ struct Clouds {
 };
 
 Clouds read_clouds(const CalibrateOptions& o) {
-  const FragmentFolder folder(o.folder, o.quiet);
+  const FragmentFolder folder(o.input, o.quiet);
   Clouds out{folder.numbers, {}};
   ViewpointNote viewpoints;
-  for (std::size_t k = 0; k < folder.files.size(); ++k) {
+  for (std::size_t k = 0; k < folder.scans.size(); ++k) {
     out.clouds.push_back(folder.read(k, mesh_spacing(o.method.voxel_size),
                                      o.quiet ? MeshNote::none : MeshNote::print));
-    if (!o.quiet) viewpoints.see(out.clouds.back(), folder.files[k]);
-    check_voxel_size(o.method.voxel_size, extent_of(out.clouds.back().points), folder.files[k]);
+    if (!o.quiet) viewpoints.see(out.clouds.back(), folder.scans[k].path);
+    check_voxel_size(o.method.voxel_size, extent_of(out.clouds.back().points),
+                     folder.scans[k].path);
   }
   viewpoints.print();
   return out;
@@ -98,7 +100,7 @@ std::optional<PromisedRisk> promise(const CalibrateOptions& o, const Calibration
     return out;
   }
   if (result.of_two_scans().empty())
-    throw InvalidArgument(o.folder + " has no decided pair of different scans");
+    throw InvalidArgument(o.input.path + " has no decided pair of different scans");
   std::vector<std::vector<CalibrationSample>> pairs{result.of_two_scans()};
   for (const SceneFile& scene : scenes) pairs.push_back(scene.pairs);
   out.threshold = control_risk_of_scenes(pairs, out.control, result.calibration);
@@ -139,19 +141,19 @@ int run(CalibrateOptions o) {
   o.method.refuse({"--min-score"}, "in a calibration: poses of every confidence count");
   if (o.method.preset == "loopsmart")
     throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
-  std::vector<NamedPath> inputs = {{"DIR", o.folder}, {"--trajectory", o.trajectory}};
+  std::vector<NamedPath> inputs = {{"SCANS", o.input.path}, {"--trajectory", o.trajectory}};
   for (const std::string& scene : o.scenes) inputs.push_back({"--scenes", scene});
   check_outputs({{"-o", o.output}}, inputs);
   const std::vector<SceneFile> scenes = read_scenes(o.scenes);
-  const FragmentFolder folder(o.folder, true);
+  const FragmentFolder folder(o.input, true);
   std::vector<UnalignedIsometry3d> poses;
-  if (!o.trajectory.empty()) poses = read_scan_poses(o.trajectory, folder.numbers, o.folder);
-  choose_voxel_size(o.method, o.folder);
+  if (!o.trajectory.empty()) poses = read_scan_poses(o.trajectory, folder.scans, o.input.path);
+  choose_voxel_size(o.method, o.input);
   const RegistrationOptions options = o.method.registration();
   for (const SceneFile& scene : scenes) check_options(scene, scene_options(options));
   const InterruptGuard guard;
   const Clouds clouds = read_clouds(o);
-  const SceneFile here{o.folder, {}, fingerprints(clouds.views()), {}};
+  const SceneFile here{o.input.path, {}, fingerprints(clouds.views()), {}};
   for (const SceneFile& scene : scenes) check_different(here, scene);
   const Context context = o.method.context();
 
@@ -201,16 +203,15 @@ void add_calibrate(CommandLine& line) {
   const auto o = std::make_shared<CalibrateOptions>();
   Verb verb = line.verb("calibrate",
                         "Fit the scale of the confidence to the clouds of a folder, without truth");
-  verb.option(
-          "DIR", o->folder,
-          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
-      .required();
+  verb.option("SCANS", o->input.path, kScansHelp).required();
+  verb.flag("--recursive", o->input.recursive, kRecursiveHelp);
   verb.option("-o,--output", o->output,
               "JSON file for --calibration of register, batch and reconstruct")
       .required();
-  verb.option("--trajectory", o->trajectory,
-              "Poses of the fragments, which decide instead of loops: TUM with fragment "
-              "numbers as times, or poses.txt");
+  verb.option(
+      "--trajectory", o->trajectory,
+      "Poses of the scans, which decide instead of loops: TUM with numbers or names of scans "
+      "as times, or poses.txt");
   verb.option("--self-pairs", o->calibration.self_pairs, "Pairs made of one scan")
       .natural()
       .show_default();

@@ -38,6 +38,7 @@ struct Options {
   MethodOptions method;
   PlaceOptions place;
   std::optional<double> tolerance;  // none: from the voxel size
+  bool recursive = false;
 };
 
 Json counts(const PointChanges& changes) {
@@ -87,7 +88,7 @@ int run(Options o) {
   std::optional<UnalignedIsometry3d> pose;
   if (!o.pose.empty()) pose = read_pose(o.pose);
   const Context context = o.method.context();
-  const MapInput input(o.map);
+  const MapInput input(o.map, o.recursive);
   choose_voxel_size(o.method, input);
   const LocateOptions options = locate_options(o.method);
   MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
@@ -131,6 +132,7 @@ void add_change(CommandLine& line) {
               "A cloud, a folder of scans with poses, the output of reconstruct, or a file of "
               "locate --save-map")
       .required();
+  verb.flag("--recursive", o->recursive, kRecursiveHelp);
   o->method.add_to(verb);
   o->place.add_to(verb);
   verb.option("--pose", o->pose,

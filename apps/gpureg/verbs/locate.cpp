@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -31,15 +32,40 @@ using localization::LocateStatus;
 using localization::MapOptions;
 using localization::PreparedMap;
 
+/// A cloud, or scans with poses by odometry, which become one.
+struct LocatedScan {
+  std::string path, name;
+};
+
 struct LocateRun {
   std::vector<std::string> files;  // scans, then the map
+  std::vector<LocatedScan> scans;  // found in these files
+  bool recursive = false;
   MethodOptions method;
   PlaceOptions place;
   std::string json, save_map;
 
-  std::vector<std::string> scans() const { return {files.begin(), files.end() - 1}; }
   const std::string& map() const { return files.back(); }
 };
+
+/// Of a folder, a pattern or a list without poses, and of a file with several scans, every scan is
+/// looked for.
+std::vector<LocatedScan> scans_in(const LocateRun& o) {
+  std::vector<LocatedScan> out;
+  for (std::size_t k = 0; k + 1 < o.files.size(); ++k) {
+    const std::string& file = o.files[k];
+    const ScanInput input{file, o.recursive && std::filesystem::is_directory(file)};
+    const bool one = io::names_scans(file)
+                         ? has_poses(input)
+                         : io::scan_path(file).part > 0 || io::count_scans(file) < 2;
+    if (one) {
+      out.push_back({file, base_name(file)});
+      continue;
+    }
+    for (const io::ScanFile& scan : input.list(false)) out.push_back({scan.path, scan.name});
+  }
+  return out;
+}
 
 void print(const std::string& file, const LocateResult& result) {
   std::cout << "scan     " << file << ": " << grouped(result.scan_points) << " points, "
@@ -61,11 +87,11 @@ std::vector<PointCloud> read_scans(const LocateRun& o, const Context& context,
                                    const MapOptions& of_map, const LocateOptions& options) {
   std::vector<PointCloud> clouds;
   ViewpointNote note;
-  for (const std::string& file : o.scans()) {
-    clouds.push_back(read_scan(file, context, of_map));
-    o.place.viewpoint.check_cloud("--viewpoint", clouds.back(), file);
+  for (const LocatedScan& scan : o.scans) {
+    clouds.push_back(read_scan(scan.path, context, of_map));
+    o.place.viewpoint.check_cloud("--viewpoint", clouds.back(), scan.path);
     o.place.viewpoint.apply(clouds.back());
-    if (options.registration.prepare.depth_maps > 0) note.see(clouds.back(), file);
+    if (options.registration.prepare.depth_maps > 0) note.see(clouds.back(), scan.path);
   }
   note.print();
   return clouds;
@@ -75,9 +101,11 @@ std::vector<LocateResult> locate_all(const LocateRun& o, const Context& context,
                                      const std::vector<PointCloud>& clouds, const PreparedMap& map,
                                      const LocateOptions& options) {
   std::vector<PointCloudView> views;
+  std::vector<std::string> paths;
   for (const PointCloud& cloud : clouds) views.push_back(o.place.viewpoint.view(cloud));
+  for (const LocatedScan& scan : o.scans) paths.push_back(scan.path);
   return localization::locate(context, views, map, options,
-                              std::vector<LocatePrior>(views.size(), o.place.prior()), o.scans());
+                              std::vector<LocatePrior>(views.size(), o.place.prior()), paths);
 }
 
 void write_json(const LocateRun& o, const Context& context, const PreparedMap& map,
@@ -90,9 +118,11 @@ void write_json(const LocateRun& o, const Context& context, const PreparedMap& m
   head["map"] = {{"file", o.map()}, {"points", map.size()}, {"tiles", map.tiles()}};
   head["seconds"] = seconds;
   head["peak_memory_mib"] = peak_memory_mib();
-  const std::vector<std::string> scans = o.scans();
   write_document(o.json, head, {"scans", results.size(), [&](std::size_t k) {
-                                  return to_json(results[k], scans[k]);
+                                  Json json = {{"file", o.scans[k].path},
+                                               {"name", o.scans[k].name}};
+                                  json.update(to_json(results[k], o.scans[k].path));
+                                  return json;
                                 }});
 }
 
@@ -101,17 +131,18 @@ int run(LocateRun o) {
     throw InvalidArgument("one file is given, expected scans and then the map");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   o.place.check();
-  if (o.scans().empty()) {
+  if (o.files.size() < 2) {
     const std::string why = "without a scan";
     o.method.refuse(
         {"--quality", "--seed", "--min-score", "--viewpoint", "--up", "--near", "--json"}, why);
     o.method.refuse_set_outside({"prepare"}, why);
   }
   std::vector<NamedPath> inputs{{"MAP", o.map()}};
-  for (const std::string& file : o.scans()) inputs.push_back({"SCAN", file});
+  for (std::size_t k = 0; k + 1 < o.files.size(); ++k) inputs.push_back({"SCAN", o.files[k]});
   check_outputs({{"--json", o.json}, {"--save-map", o.save_map}}, inputs);
   const Context context = o.method.context();
-  const MapInput input(o.map());
+  o.scans = scans_in(o);
+  const MapInput input(o.map(), o.recursive);
   choose_voxel_size(o.method, input);
   const LocateOptions options = locate_options(o.method);
   MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
@@ -123,14 +154,14 @@ int run(LocateRun o) {
             << (map.tiles() == 1 ? " tile\n" : " tiles\n") << "backend  " << context.description()
             << "\n";
   if (!o.save_map.empty()) map.save(o.save_map);
-  if (o.scans().empty()) return kOk;
+  if (o.scans.empty()) return kOk;
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<LocateResult> results = locate_all(o, context, scans, map, options);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   bool all = true;
   for (std::size_t k = 0; k < results.size(); ++k) {
-    print(o.files[k], results[k]);
+    print(o.scans[k].path, results[k]);
     all = all && results[k].status == LocateStatus::found;
   }
   std::cout << "seconds  " << fixed(seconds, 2) << "\n";
@@ -143,12 +174,13 @@ int run(LocateRun o) {
 void add_locate(CommandLine& line) {
   const auto o = std::make_shared<LocateRun>();
   Verb verb = line.verb("locate", "Find scans in a map, or say that they are not there");
-  verb.option(
-          "SCAN...MAP", o->files,
-          "Scans, clouds or folders of scans with poses by odometry, which are one scan; then the "
-          "map: a cloud, a folder of scans with poses, the output of "
-          "reconstruct, or a file of --save-map")
+  verb.option("SCAN...MAP", o->files,
+              "Scans: clouds, folders of clouds, patterns in quotes, lists; a folder with poses by "
+              "odometry (poses.txt, trajectory.txt) is one scan. Then the map: a cloud, a folder "
+              "of scans "
+              "with poses, the output of reconstruct, or a file of --save-map")
       .required();
+  verb.flag("--recursive", o->recursive, kRecursiveHelp);
   o->method.add_to(verb);
   o->place.add_to(verb);
   verb.option("--save-map", o->save_map, "Write the prepared map; SCAN may be left out");

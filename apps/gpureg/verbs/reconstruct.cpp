@@ -35,7 +35,8 @@ namespace fs = std::filesystem;
 constexpr const char* kJournal = "pairs.journal";
 
 struct ReconstructOptions {
-  std::string folder, output, pairs = "all", results, odometry;
+  ScanInput input;
+  std::string output, pairs = "all", results, odometry;
   MethodOptions method;
   std::uint32_t prune = 0;
   pose_graph::DriftOptions drift;
@@ -53,7 +54,7 @@ struct ReconstructOptions {
 
 /// Makes the output folder, and refuses one whose files could be inputs.
 void check_output_folder(const ReconstructOptions& o) {
-  const std::vector<NamedPath> inputs = {{"DIR", o.folder},
+  const std::vector<NamedPath> inputs = {{"SCANS", o.input.path},
                                          {"--results", o.results},
                                          {"--odometry", o.odometry},
                                          {"--pairs", o.pairs == "all" ? "" : o.pairs},
@@ -63,8 +64,8 @@ void check_output_folder(const ReconstructOptions& o) {
   if (fs::exists(o.output, error) && !fs::is_directory(o.output, error))
     throw IoError("cannot write " + o.output + ": it is no folder");
   // The poses.txt of a data set is its truth.
-  if (fs::equivalent(o.output, o.folder, error))
-    throw InvalidArgument("-o and DIR must be different folders, not both " + o.output);
+  if (fs::equivalent(o.output, o.input.folder(), error))
+    throw InvalidArgument("-o and SCANS must be different folders, not both " + o.output);
   fs::create_directories(o.output, error);
   if (error) throw IoError("cannot make the folder " + o.output + ": " + error.message());
   if (const std::string pairs = o.file("pairs.json");
@@ -84,16 +85,16 @@ void check_output_folder(const ReconstructOptions& o) {
 
 /// A bad file shall show before the clouds are read.
 void check_inputs(const ReconstructOptions& o) {
-  check_pairs(o.folder, o.pairs);
+  check_pairs(o.input, o.pairs);
   if (o.odometry.empty()) return;
-  read_odometry(o.odometry, FragmentFolder(o.folder, true).numbers, o.folder);
+  read_odometry(o.odometry, FragmentFolder(o.input, true).scans, o.input.path);
 }
 
 /// One run, from the folder to the map.
 class Reconstruct {
  public:
   explicit Reconstruct(const ReconstructOptions& o) : o_(o), context_(o.method.context()) {
-    run_.folder = o.folder;
+    run_.input = o.input;
     run_.output = o.output;
     run_.options = o.method.registration();
   }
@@ -104,10 +105,10 @@ class Reconstruct {
     if (o_.results.empty()) {
       if (!align_pairs()) return say_interrupted();
     } else {
-      run_.scene = PreparedFolder(FragmentFolder(o_.folder, o_.quiet));
+      run_.scene = PreparedFolder(FragmentFolder(o_.input, o_.quiet));
       run_.pairs = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
       if (!o_.no_audit) {
-        PreparedFolder scene = prepare_folder(context_, o_.folder, run_.options.prepare, o_.quiet);
+        PreparedFolder scene = prepare_folder(context_, o_.input, run_.options.prepare, o_.quiet);
         if (scene.interrupted) return say_interrupted();
         run_.seconds.prepare = scene.seconds;
         run_.scene = std::move(scene);
@@ -146,7 +147,7 @@ class Reconstruct {
   /// Prepares and aligns. false: interrupted.
   bool align_pairs() {
     PreparedFolder& scene = run_.scene;
-    scene = prepare_folder(context_, o_.folder, run_.options.prepare, o_.quiet);
+    scene = prepare_folder(context_, o_.input, run_.options.prepare, o_.quiet);
     if (scene.interrupted) return false;
     run_.seconds.prepare = scene.seconds;
     check_voxel_size(run_.options.prepare.voxel_size, scene.extent, "the largest fragment");
@@ -154,7 +155,9 @@ class Reconstruct {
     // A bad file shall show before hours of work.
     if (!o_.odometry.empty()) odometry_ = known_poses();
     const Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
-    if (pairs.empty()) throw InvalidArgument(o_.folder + " holds one fragment; a map needs two");
+    if (pairs.empty())
+      throw InvalidArgument(o_.input.path + " holds one scan, " + scene.scans[0].name +
+                            "; a map needs two");
     pairs_.emplace(scene, pairs, run_.options, std::nullopt, o_.journal(), o_.journal_mode(),
                    o_.quiet);
     pairs_->align(context_);
@@ -173,8 +176,8 @@ class Reconstruct {
   std::vector<reconstruction::Odometry> known_poses() const {
     std::vector<int> unusable;
     for (const UnusableFragment& fragment : run_.scene.unusable)
-      unusable.push_back(fragment.number);
-    return read_odometry(o_.odometry, run_.scene.numbers, o_.folder, unusable);
+      unusable.push_back(fragment.scan.number);
+    return read_odometry(o_.odometry, run_.scene.scans, o_.input.path, unusable);
   }
 
   /// The pairs of --prune, and of consecutive scans where odometry knows them.
@@ -312,18 +315,16 @@ class Reconstruct {
 
 void add_reconstruct(CommandLine& line) {
   const auto o = std::make_shared<ReconstructOptions>();
-  Verb verb =
-      line.verb("reconstruct", "Make one map of the unordered fragments cloud_bin_<i> of a folder");
+  Verb verb = line.verb("reconstruct", "Make one map of the unordered scans of a folder");
+  verb.option("SCANS", o->input.path, kScansHelp).required();
+  verb.flag("--recursive", o->input.recursive, kRecursiveHelp);
   verb.option(
-          "DIR", o->folder,
-          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
+          "-o,--output", o->output,
+          "Folder for reconstruction.json, edges.log (Redwood), map.html, pairs.json, scans.csv "
+          "(names of the numbers), and of each island poses.txt, trajectory.txt (TUM), graph.g2o "
+          "and map.ply")
       .required();
-  verb.option("-o,--output", o->output,
-              "Folder for reconstruction.json, edges.log (Redwood), map.html, pairs.json, and of "
-              "each island poses.txt, trajectory.txt (TUM), graph.g2o and map.ply")
-      .required();
-  const Option pairs =
-      verb.option("--pairs", o->pairs, "all, or a file with one pair `i j` a line").show_default();
+  const Option pairs = verb.option("--pairs", o->pairs, kPairsHelp).show_default();
   const Option results =
       verb.option("--results", o->results,
                   "JSON of `gpureg batch`, or pairs.json of a map, instead of aligning");
@@ -335,8 +336,8 @@ void add_reconstruct(CommandLine& line) {
       .excludes(results);
   const Option odometry = verb.option(
       "--odometry", o->odometry,
-      "Known relative poses: a trajectory (TUM with fragment numbers as times, or poses.txt), of "
-      "which those of consecutive fragments count, or a Redwood log of pairs");
+      "Known relative poses: a trajectory (TUM with numbers or names of scans as times, or "
+      "poses.txt), of which those of consecutive scans count, or a Redwood log of pairs");
   verb.option("--drift", o->drift.translation_per_metre,
               "Odometry: metres of error per metre travelled")
       .show_default()
@@ -380,7 +381,7 @@ void add_reconstruct(CommandLine& line) {
     if (o->no_map) o->method.refuse({"--map-voxel-size"}, "with --no-map");
     check_output_folder(*o);
     check_inputs(*o);
-    choose_voxel_size(o->method, o->folder, o->resume ? o->journal() : "");
+    choose_voxel_size(o->method, o->input, o->resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Reconstruct(*o).run();
   });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "inputs/cloud_file.hpp"
+#include "inputs/scan_input.hpp"
 #include "options/output_path.hpp"
 #include "pages/report_page.hpp"
 #include "pages/report_pairs.hpp"
@@ -46,14 +48,17 @@ void check_count(const char* option, const std::vector<std::string>& values, std
                           " results; give it once for all or once for each, in the same order");
 }
 
-std::vector<Picture> draw(const std::vector<SamplePair>& samples, const std::string& folder) {
-  std::map<int, std::string> files;
-  for (const auto& [number, file] : io::list_fragments(folder)) files[number] = file;
+std::vector<Picture> draw(const ResultFile& result, const std::vector<SamplePair>& samples,
+                          const ScanInput& input) {
+  const std::vector<io::ScanFile> scans = input.list(true);
   const auto read = [&](int number) {
-    const auto found = files.find(number);
-    if (found == files.end())
-      throw IoError(folder + ": there is no fragment " + std::to_string(number));
-    return read_cloud(found->second, 0, MeshNote::none);
+    const auto name = result.names.find(number);
+    const auto found = std::find_if(scans.begin(), scans.end(), [&](const io::ScanFile& scan) {
+      return name == result.names.end() ? scan.number == number : scan.name == name->second;
+    });
+    if (found == scans.end())
+      throw IoError(input.path + ": there is no " + result.title_of(number));
+    return read_cloud(found->path, 0, MeshNote::none);
   };
   std::vector<Picture> pictures;
   for (const SamplePair& sample : samples) {
@@ -90,10 +95,14 @@ ReportEntry read_entry(const ReportOptions& o, std::size_t k) {
 
 void add_pictures(const std::string& folder, ReportEntry& entry) {
   if (folder.empty() || folder == kNoPictures) return;
+  const bool recursive = text_of(entry.result.document, "/recursive") == "true" &&
+                         std::filesystem::is_directory(folder);
   entry.pictures =
-      draw(entry.truth ? samples(evaluate_pairs(*entry.truth, entry.result), kPicturesOfAKind)
-                       : samples(entry.result, kPictures),
-           folder);
+      draw(entry.result,
+           entry.truth
+               ? samples(entry.result, evaluate_pairs(*entry.truth, entry.result), kPicturesOfAKind)
+               : samples(entry.result, kPictures),
+           {folder, recursive});
 }
 
 void make(const ReportOptions& o) {
@@ -132,8 +141,9 @@ void add_report(CommandLine& line) {
   add("--ground-truth", o->truths,
       "Folder with gt.log and gt.info; of several results: once for all or once for each");
   add("--clouds", o->clouds,
-      "Folder with the fragments, for pictures of some pairs; once for all or once for each, - for "
-      "none");
+      "The scans, for pictures of some pairs, as the batch was given them; once for all or once "
+      "for "
+      "each, - for none");
   add("--name", o->names, "Name of a result in a comparison, once for each; default: its path");
   verb.option("-o,--output", o->output, "HTML file to write").required();
   verb.run([o] {

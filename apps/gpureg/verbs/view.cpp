@@ -13,6 +13,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
 #include "inputs/cloud_file.hpp"
+#include "inputs/scan_input.hpp"
 #include "json/json_file.hpp"
 #include "pages/report_page.hpp"
 #include "pages/report_tables.hpp"
@@ -98,8 +99,8 @@ std::string page_of(const std::string& path) {
     }
   } else if (document.contains("pairs")) {
     const std::string folder = text_of(document, "/folder");
-    const bool there = fs::is_directory(folder);
-    if (!there) std::cerr << "note: no pictures: there is no folder '" << folder << "'\n";
+    const bool there = ScanInput{folder}.exists();
+    if (!there) std::cerr << "note: no pictures: there are no scans '" << folder << "'\n";
     write_report(path, there ? folder : "-", page);
   } else {
     throw InvalidArgument(path + " has no page: it is a result of `gpureg " + made_by +

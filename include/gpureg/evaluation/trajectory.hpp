@@ -3,8 +3,10 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 /// Trajectories and their errors (component `evaluation`). Every function is thread-safe.
@@ -29,12 +31,18 @@ enum class TrajectoryFormat {
   blocks
 };
 
+/// What stands for the time in a file of named poses; NaN: the pose is left out.
+using TimeOfName = std::function<std::optional<double>(std::string_view name)>;
+
+/// @param time_of says which time a name means that stands where TUM and blocks have a number, and
+///   which may have blanks; none: it is no name, but a number. Without it, names are refused.
 /// @return the poses in ascending order of their times.
 /// @throws IoError naming file, line and reason: missing, another number of fields than the format
 ///   has, a number that is not finite, a pose that is not rigid, a time that is there twice, no
 ///   pose.
 Trajectory read_trajectory(const std::string& path,
-                           TrajectoryFormat format = TrajectoryFormat::automatic);
+                           TrajectoryFormat format = TrajectoryFormat::automatic,
+                           const TimeOfName& time_of = {});
 
 /// Writes lines `time tx ty tz qx qy qz qw` (TUM), with the digits that give the same numbers when
 /// they are read, all or nothing.

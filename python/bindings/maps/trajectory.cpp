@@ -8,6 +8,7 @@
 #include "inputs/map_poses.hpp"
 #include "inputs/odometry_file.hpp"
 #include "matrix.hpp"
+#include "scans.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -88,8 +89,9 @@ void bind_trajectory(py::module_& m) {
   // Of fragments, as the command reads them; `folder` is what messages call their set.
   m.def(
       "read_pose_file",
-      [](const std::string& path, const std::vector<int>& numbers, const std::string& folder) {
-        const auto map = cli::read_pose_file(path, numbers, folder);
+      [](const std::string& path, const std::vector<int>& numbers,
+         const std::vector<std::string>& names, const std::string& folder) {
+        const auto map = cli::read_pose_file(path, scans_of(numbers, names), folder);
         py::array_t<double> matrices(
             {static_cast<py::ssize_t>(map.scans.size()), py::ssize_t(4), py::ssize_t(4)});
         double* next = matrices.mutable_data();
@@ -101,18 +103,21 @@ void bind_trajectory(py::module_& m) {
         }
         return py::make_tuple(matrices, islands);
       },
-      py::arg("path"), py::arg("numbers"), py::arg("folder"));
+      py::arg("path"), py::arg("numbers"), py::arg("names"), py::arg("folder"));
   m.def(
       "read_odometry",
-      [](const std::string& path, const std::vector<int>& numbers, const std::string& folder,
+      [](const std::string& path, const std::vector<int>& numbers,
+         const std::vector<std::string>& names, const std::string& folder,
          const std::vector<int>& unusable) {
         py::list out;
-        for (const auto& edge : cli::read_odometry(path, numbers, folder, unusable))
+        for (const auto& edge :
+             cli::read_odometry(path, scans_of(numbers, names), folder, unusable))
           out.append(py::make_tuple(edge.source, edge.target,
                                     array_of(edge.target_from_source.matrix()), py::none()));
         return out;
       },
-      py::arg("path"), py::arg("numbers"), py::arg("folder"), py::arg("unusable"));
+      py::arg("path"), py::arg("numbers"), py::arg("names"), py::arg("folder"),
+      py::arg("unusable"));
   m.def(
       "evaluate_trajectory",
       [](const DoubleArray& times, const DoubleArray& poses, const DoubleArray& true_times,

@@ -71,7 +71,7 @@ class Plan:
     def manifest(self) -> dict[str, Any]:
         """What a run is. Devices and memory may change: they change no result."""
         return {
-            "gpureg_run": 2,
+            "gpureg_run": 3,
             "version": _core.__version__,
             "options": options_dict(self.options),
             "chunk_size": self.chunk_size,
@@ -83,8 +83,10 @@ class Plan:
                 ).hexdigest(),
             },
             "fragments": [
-                {"number": number, "fingerprint": self.fragments.fingerprint(position)}
-                for position, number in enumerate(self.fragments.numbers)
+                {"number": number, "name": name, "fingerprint": self.fragments.fingerprint(k)}
+                for k, (number, name) in enumerate(
+                    zip(self.fragments.numbers, self.fragments.names)
+                )
             ],
         }
 

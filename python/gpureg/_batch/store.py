@@ -24,6 +24,7 @@ from .table import entries_of, table_of
 
 Row = dict[str, Any]
 
+_NAMES = ("name_i", "name_j")  # columns of the final table
 _DIGEST = 16  # bytes before the Parquet data of a chunk: their digest
 
 
@@ -84,7 +85,9 @@ class Store:
         """Raises ValueError if the folder has pairs that are none of this run's."""
         keys = {key for table in self._tables() for key in _keys_of(table)}
         used = {number for key in keys for number in key}
-        changed = difference(_of_fragments(before, used), _of_fragments(now, used))
+        changed = _renamed(before, now, used) or difference(
+            _of_fragments(before, used), _of_fragments(now, used)
+        )
         planned = map(tuple, self._plan.numbers(self._plan.pairs).tolist())
         if not changed and not keys <= set(planned):
             changed = difference(before.get("pairs"), now["pairs"], "pairs")
@@ -101,7 +104,8 @@ class Store:
     def _tables(self) -> Iterator[pa.Table]:
         """All pairs that there are, perhaps some of them twice."""
         if self.complete:
-            yield read_table(self.table_path)
+            table = read_table(self.table_path)
+            yield table.drop_columns([name for name in _NAMES if name in table.column_names])
         for pattern in ("*.chunk", "*.partial"):
             for path in sorted(self._chunks.glob(pattern)):
                 yield read_chunk(path)
@@ -221,10 +225,18 @@ class Store:
                     yield read_chunk(path)
                     break
 
+    def _with_names(self, table: pa.Table) -> pa.Table:
+        names = dict(zip(self._plan.fragments.numbers, self._plan.fragments.names))
+        for column, name in zip(("i", "j"), _NAMES):
+            values = [names[number] for number in table[column].to_pylist()]
+            table = table.append_column(name, pa.array(values, pa.string()))
+        return table
+
     def _merge(self, temporary: Path) -> None:
         with contextlib.ExitStack() as stack:
             writer = None
             for table in self._read():
+                table = self._with_names(table)
                 if writer is None:
                     writer = stack.enter_context(pq.ParquetWriter(temporary, table.schema))
                 writer.write_table(table)
@@ -232,6 +244,18 @@ class Store:
 
 def _keys_of(table: pa.Table) -> Iterator[Key]:
     return zip(table["i"].to_pylist(), table["j"].to_pylist())
+
+
+def _renamed(before: Row, now: Row, used: set[int]) -> str:
+    """Which fragment has another file than before, as where files come and go whose numbers are
+    places; empty where none has.
+    """
+    names = {entry["number"]: entry.get("name") for entry in now["fragments"]}
+    for entry in before.get("fragments", []):
+        number, name = entry["number"], entry.get("name")
+        if number in used and name is not None and names.get(number) != name:
+            return f"fragment {number} was {name!r}, now {names.get(number, 'none')!r}: the list of scans has changed"
+    return ""
 
 
 def _of_fragments(manifest: Row, numbers: set[int]) -> Row:

@@ -22,9 +22,8 @@ struct Kind {
 
 constexpr std::string_view kCompressed = "compressed: unpack it first";
 constexpr std::string_view kRecording =
-    "a recording of sensor messages: extract its clouds first, as PCD or PLY, or in Python with "
-    "the "
-    "package rosbags";
+    "a recording of sensor messages: extract its clouds first, as examples/python/14_bag.py does "
+    "with the package rosbags";
 constexpr std::string_view kPackets =
     "a recording of a sensor's packets: export its frames as PCD or CSV with the sensor's program";
 constexpr std::string_view kImage =
