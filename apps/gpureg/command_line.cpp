@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "gpureg/error.hpp"
+#include "text.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -25,10 +26,27 @@ std::string check_natural(const std::string& text) {
   return errno == 0 ? "" : text + " is too large";
 }
 
-std::string list_of_verbs(const CLI::App& app) {
+std::vector<std::string> verbs_of(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* verb : app.get_subcommands(nullptr)) names.push_back(verb->get_name());
+  return names;
+}
+
+std::vector<std::string> options_of(const CLI::App& verb) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : verb.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  return names;
+}
+
+std::string did_you_mean(const std::string& word, const std::vector<std::string>& words) {
+  const std::string meant = nearest(word, words);
+  return meant.empty() ? "" : ", did you mean " + meant + "?";
+}
+
+std::string joined(const std::vector<std::string>& words) {
   std::string list;
-  for (const CLI::App* verb : app.get_subcommands(nullptr))
-    list += (list.empty() ? "" : ", ") + verb->get_name();
+  for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
   return list;
 }
 
@@ -43,8 +61,10 @@ std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int
   const auto chosen = app.get_subcommands();
   if (chosen.empty()) {
     const std::string first = argc > 1 ? argv[1] : "";
-    return (first.empty() ? std::string("no verb given") : "there is no verb " + first) +
-           "; verbs: " + list_of_verbs(app) + " (see `gpureg --help`)";
+    const std::vector<std::string> verbs = verbs_of(app);
+    return (first.empty() ? std::string("no verb given")
+                          : "there is no verb " + first + did_you_mean(first, verbs)) +
+           "; verbs: " + joined(verbs) + " (see `gpureg --help`)";
   }
   const std::string help = " (see `gpureg " + chosen.front()->get_name() + " --help`)";
   const std::vector<std::string> unknown = app.remaining(true);
@@ -52,7 +72,9 @@ std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int
     return error.what() + help;
   const auto option = std::find_if(unknown.begin(), unknown.end(),
                                    [](const std::string& text) { return text.rfind("-", 0) == 0; });
-  if (option != unknown.end()) return "unknown option " + *option + help;
+  if (option != unknown.end())
+    return "unknown option " + *option +
+           did_you_mean(option->substr(0, option->find('=')), options_of(*chosen.front())) + help;
   return "unexpected argument " + unknown.front() +
          (takes_scans(chosen.front()->get_name()) && ::access(unknown.front().c_str(), F_OK) == 0
               ? ": several scans are a folder, a list, or a pattern in quotes, 'scans/*.ply'"
@@ -148,8 +170,10 @@ Option Verb::flag(const std::string& names, bool& value, const std::string& help
 
 Option Verb::text(const std::string& name, std::function<bool(const std::string&)> take,
                   const std::string& help) {
-  const auto read = [name, take = std::move(take)](const std::string& text) {
-    if (!take(text)) throw CLI::ConversionError(text, name);
+  const auto read = [name, take = std::move(take), app = app_](const std::string& text) {
+    if (!take(text))
+      throw CLI::ValidationError(
+          name, "'" + text + "', expected " + app->get_option(name)->get_type_name());
   };
   return Option(app_->add_option_function<std::string>(name, read, help));
 }

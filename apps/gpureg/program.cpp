@@ -9,12 +9,14 @@
 #include <string>
 
 #include "exit_status.hpp"
+#include "option_names.hpp"
 
 namespace gpureg::cli {
 namespace {
 
 // One line, whatever the message has inside: scripts read stderr by lines.
-int fail(std::string message) {
+int fail(const std::string& what) {
+  std::string message = in_option_names(what);
   std::replace(message.begin(), message.end(), '\n', ' ');
   std::cerr << "gpureg: " << message << std::endl;
   return kBadInput;

@@ -95,7 +95,8 @@ TEST_F(BadCloud, OfManyTheFileIsNamed) {
   const Outcome batch = run({"batch", scans_.path(), "-o", scans_ / "r.log"});
   EXPECT_EQ(batch.status, 3);
   expect_holds(batch.err, {"fragment 3 is left out", bad + ": nearly all of 30000"});
-  expect_refused({"register", good, bad}, {bad + ": nearly all"});
+  expect_refused({"register", good, bad},
+                 {bad + ": nearly all", "are the units different? target is", "auto would be"});
 }
 
 }  // namespace

@@ -109,7 +109,7 @@ TEST_F(ConsistencyVerb, RefusesBadVoxelSizes) {
   const std::string result = folder_.write("r.json", document(pairs()).dump());
   for (const std::string size : {"1e9", "0", "-1", "nan", "1e-9"})
     expect_refused({"consistency", result, "--json", folder_ / "a.json", "--voxel-size", size},
-                   {"voxel_size is "});
+                   {"--voxel-size is "});
   EXPECT_FALSE(std::filesystem::exists(folder_ / "a.json"));
   EXPECT_EQ(
       run({"consistency", result, "--json", folder_ / "a.json", "--voxel-size", "0.05"}).status, 0);

@@ -73,7 +73,7 @@ TEST_F(DegenerateCloud, AllIdentical) {
 }
 
 TEST_F(DegenerateCloud, NoOverlap) {
-  expect_not_aligned(sticks(), "confidence_too_low", "confidence_too_low");
+  expect_not_aligned(sticks(), "too_little_overlap", "too_little_overlap");
 }
 
 TEST_F(DegenerateCloud, PointsThatAreNotFinite) {

@@ -226,6 +226,8 @@ TEST_F(SameFile, TheTestKnowsEveryOptionThatNamesAFile) {
                                        "--backend",
                                        "--set",
                                        "--up",
+                                       "--source-up",
+                                       "--target-up",
                                        "--near",
                                        "--source-viewpoint",
                                        "--viewpoint",

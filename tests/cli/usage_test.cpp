@@ -46,30 +46,30 @@ TEST_F(Usage, VerbsAndOptionsThatDoNotExist) {
 }
 
 TEST_F(Usage, VoxelSizes) {
-  expect_refused(with({"--voxel-size", "0"}), {"voxel_size is 0", "expected"});
-  expect_refused(with({"--voxel-size", "nan"}), {"voxel_size is nan"});
-  expect_refused(with({"--voxel-size", "-0.05"}), {"voxel_size is -0.05"});
-  expect_refused(with({"--voxel-size", "inf"}), {"voxel_size is inf"});
-  expect_refused(with({"--voxel-size", "1e30"}), {"voxel_size is 1e+30"});
-  expect_refused(with({"--voxel-size", "1e-30"}), {"voxel_size is 1e-30"});
-  expect_refused(with({"--voxel-size", "1e99"}), {"voxel_size is inf"});  // no float holds it
+  expect_refused(with({"--voxel-size", "0"}), {"--voxel-size is 0", "expected"});
+  expect_refused(with({"--voxel-size", "nan"}), {"--voxel-size is nan"});
+  expect_refused(with({"--voxel-size", "-0.05"}), {"--voxel-size is -0.05"});
+  expect_refused(with({"--voxel-size", "inf"}), {"--voxel-size is inf"});
+  expect_refused(with({"--voxel-size", "1e30"}), {"--voxel-size is 1e+30"});
+  expect_refused(with({"--voxel-size", "1e-30"}), {"--voxel-size is 1e-30"});
+  expect_refused(with({"--voxel-size", "1e99"}), {"--voxel-size is inf"});  // no float holds it
   expect_refused(with({"--voxel-size", "5cm"}), {"--voxel-size", "5cm"});
-  expect_refused(with({"--voxel-size", ""}), {"voxel_size is 0"});
+  expect_refused(with({"--voxel-size", ""}), {"--voxel-size is 0"});
   // A good number, but the cloud has more than 2^20 such voxels along an edge.
   PointCloud wide = room_scan(0);
   wide.points.emplace_back(10000.f, 0.f, 0.f);
   expect_refused(
       {"register", write_cloud(folder_, "wide.ply", wide), cloud_, "--voxel-size", "0.002"},
-      {"voxel_size 0.002", "too small"});
+      {"--voxel-size 0.002", "too small"});
 }
 
 TEST_F(Usage, AVoxelLargerThanTheCloud) {
   // Five points would be left, which any pose brings together.
-  expect_refused(with({"--voxel-size", "1000"}), {"voxel_size is 1000", cloud_, "extends over"});
+  expect_refused(with({"--voxel-size", "1000"}), {"--voxel-size is 1000", cloud_, "extends over"});
   const TemporaryFolder scans;
   write_scans(scans, 2, false);
   expect_refused({"batch", scans.path(), "-o", folder_ / "r.log", "--voxel-size", "1000"},
-                 {"voxel_size is 1000", "extends over"});
+                 {"--voxel-size is 1000", "extends over"});
 }
 
 TEST_F(Usage, OtherValues) {

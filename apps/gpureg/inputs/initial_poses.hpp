@@ -18,6 +18,7 @@ UnalignedIsometry3d read_pose(const std::string& path);
 
 /// The verified poses as a result: modes in descending order of their confidence, aligned where the
 /// first reaches min_confidence.
-RegistrationResult result_of(const std::vector<PoseVerification>& poses, double min_confidence);
+RegistrationResult result_of(const std::vector<PoseVerification>& poses, double min_confidence,
+                             std::uint32_t source_points, std::uint32_t target_points);
 
 }  // namespace gpureg::cli

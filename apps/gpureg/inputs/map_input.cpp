@@ -108,6 +108,19 @@ MapInput::MapInput(std::string of, bool with_subfolders)
   }
 }
 
+std::vector<PointCloud> MapInput::sample() const {
+  std::vector<PointCloud> clouds;
+  if (kind == Kind::saved) clouds.push_back(saved->cloud());
+  if (kind == Kind::cloud) clouds.push_back(read_cloud(path, 0, MeshNote::none));
+  if (kind != Kind::scans) return clouds;
+  constexpr std::size_t kMost = 8;
+  const auto [folder, poses] = posed_scans({path, recursive});
+  const std::size_t count = std::min(folder.numbers.size(), kMost);
+  for (std::size_t k = 0; k < count; ++k)
+    clouds.push_back(folder.read(k * folder.numbers.size() / count, 0, MeshNote::none));
+  return clouds;
+}
+
 PreparedMap MapInput::prepare(const Context& context,
                               const localization::MapOptions& options) const {
   if (saved) return *saved;

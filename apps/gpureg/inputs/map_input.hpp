@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "gpureg/localization.hpp"
 #include "inputs/scan_input.hpp"
@@ -25,6 +26,9 @@ struct MapInput {
   localization::MapOptions options_or(const localization::MapOptions& otherwise) const {
     return saved ? saved->options() : otherwise;
   }
+
+  /// The cloud, or some scans of the folder, evenly chosen, to judge their spacing by.
+  std::vector<PointCloud> sample() const;
 
   /// Makes the map of a cloud or of scans; a saved one is returned as it is.
   /// @throws IoError, InvalidArgument naming the file.

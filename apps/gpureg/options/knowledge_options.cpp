@@ -82,19 +82,49 @@ PointCloudView ViewpointChoice::view(const PointCloud& cloud) const {
   return view;
 }
 
-std::optional<GravityPrior> up_prior(const std::string& text) {
-  if (text.empty()) return std::nullopt;
+namespace {
+
+/// Direction of an option, and max_angle where the text has a fourth number.
+Eigen::Vector3d up_of(const std::string& option, const std::string& text, double* max_angle) {
   const std::vector<double> numbers = numbers_of(text);
   const auto refuse = [&](const char* expected) {
-    throw InvalidArgument("--up is " + text + ", expected " + expected);
+    throw InvalidArgument(option + " is " + text + ", expected " + expected);
   };
-  if (numbers.size() != 3 && numbers.size() != 4) refuse("x,y,z or x,y,z,degrees");
+  const bool angle = max_angle != nullptr && numbers.size() == 4;
+  if (numbers.size() != 3 && !angle)
+    refuse(max_angle != nullptr ? "x,y,z or x,y,z,degrees" : "x,y,z");
+  const Eigen::Vector3d up = direction(numbers);
+  if (!up.allFinite() || !(up.norm() > 1e-9)) refuse("a direction x,y,z, finite and not 0");
+  if (angle) *max_angle = numbers[3];
+  if (angle && !(*max_angle > 0 && *max_angle <= 180)) refuse("degrees in (0, 180]");
+  return up;
+}
+
+}  // namespace
+
+std::optional<GravityPrior> up_prior(const std::string& text) {
+  return UpChoice{text, "", ""}.prior();
+}
+
+void UpChoice::add_to(Verb& verb, const std::string& clouds, const std::string& source,
+                      const std::string& target) {
+  verb.option("--up", up,
+              "Vertical direction x,y,z in " + clouds +
+                  ", and perhaps how many degrees it may be off (without: 10): 0,0,1,5");
+  verb.option("--source-up", source_up,
+              "The same of " + source + " alone, x,y,z, where its frame differs");
+  verb.option("--target-up", target_up, "The same of " + target + " alone");
+}
+
+std::optional<GravityPrior> UpChoice::prior() const {
+  if (up.empty() && source_up.empty() && target_up.empty()) return std::nullopt;
   GravityPrior prior;
-  prior.source_up = prior.target_up = direction(numbers);
-  if (!prior.source_up.allFinite() || !(prior.source_up.norm() > 1e-9))
-    refuse("a direction x,y,z, finite and not 0");
-  if (numbers.size() == 4) prior.max_angle = numbers[3];
-  if (!(prior.max_angle > 0 && prior.max_angle <= 180)) refuse("degrees in (0, 180]");
+  if (!up.empty()) prior.source_up = prior.target_up = up_of("--up", up, &prior.max_angle);
+  if (!source_up.empty()) prior.source_up = up_of("--source-up", source_up, nullptr);
+  if (!target_up.empty()) prior.target_up = up_of("--target-up", target_up, nullptr);
+  if (up.empty() && (source_up.empty() || target_up.empty()))
+    throw InvalidArgument(source_up.empty() ? "--target-up needs --up or --source-up"
+                                            : "--source-up needs --up or --target-up");
   return prior;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "command_line.hpp"
 #include "gpureg/point_cloud.hpp"
 #include "gpureg/prepared_cloud.hpp"
 #include "gpureg/prior.hpp"
@@ -28,6 +29,18 @@ struct ViewpointChoice {
 
  private:
   bool is_word() const;  ///< text is no place
+};
+
+/// The vertical direction: --up of both clouds, --source-up and --target-up of one.
+struct UpChoice {
+  std::string up, source_up, target_up;
+
+  /// @param clouds, source, target what the help calls them.
+  void add_to(Verb& verb, const std::string& clouds, const std::string& source,
+              const std::string& target);
+  bool empty() const { return up.empty() && source_up.empty() && target_up.empty(); }
+  /// @return none without any. @throws InvalidArgument naming option and text.
+  std::optional<GravityPrior> prior() const;
 };
 
 /// Gravity prior of `--up x,y,z[,degrees]`, for both clouds.

@@ -7,6 +7,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "inputs/calibration_file.hpp"
+#include "option_names.hpp"
 #include "options/set_option.hpp"
 #include "text.hpp"
 
@@ -42,8 +43,8 @@ void MethodOptions::add_to(Verb verb) {
             if (text.empty()) voxel_size = 0;  // refused by name, later
             return text.empty() || automatic_voxel_size || read_number(text, voxel_size);
           },
-          "Edge of the downsampling voxel in metres; every other length follows from it. auto: "
-          "suggested by the clouds")
+          "Edge of the downsampling voxel in the unit of the clouds (the default is for rooms in "
+          "metres); every other length follows from it. auto: suggested by the clouds")
       .show_default(significant(static_cast<double>(voxel_size), 6))
       .type_name("FLOAT or auto");
   verb.option("--preset", preset,
@@ -112,6 +113,9 @@ bool MethodOptions::sets_confidence() const {
 RegistrationOptions MethodOptions::registration() const {
   if (preset == "loopsmart" && given("--quality"))
     throw InvalidArgument("--quality does nothing with --preset loopsmart");
+  set_voxel_size_origin(automatic_voxel_size    ? VoxelSizeOrigin::automatic
+                        : given("--voxel-size") ? VoxelSizeOrigin::given
+                                                : VoxelSizeOrigin::standard);
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
                                     : RegistrationOptions::from_voxel_size(voxel_size, quality);
@@ -133,7 +137,15 @@ RegistrationOptions MethodOptions::registration() const {
     options.min_confidence = *min_score;
   for (const std::string& assignment : set) set_option(options, assignment);
   for (const std::string& assignment : set) refuse_idle(options, assignment);
-  options.validate();
+  try {
+    options.validate();
+  } catch (const InvalidArgument& error) {
+    // What follows from the voxel size was not given either.
+    const std::string what = error.what();
+    if (!set.empty() || what.find("voxel_size") != std::string::npos) throw;
+    throw InvalidArgument("voxel_size is " + significant(static_cast<double>(voxel_size), 6) +
+                          ", from which follows: " + what);
+  }
   return options;
 }
 
@@ -144,6 +156,17 @@ void MethodOptions::choose_voxel_size(const std::vector<PointCloudView>& clouds,
   if (!suggestion.valid())
     throw InvalidArgument("--voxel-size auto: " + what + ": " + explain(suggestion.reason));
   voxel_size = suggestion.voxel_size;
+}
+
+std::string MethodOptions::suggestion_text(const std::vector<PointCloudView>& clouds) const {
+  if (given("--voxel-size")) return "";
+  constexpr double kFar = 4;
+  const VoxelSizeSuggestion suggestion = suggest_voxel_size(clouds);
+  const double suggested = static_cast<double>(suggestion.voxel_size);
+  const double used = static_cast<double>(voxel_size);
+  if (!suggestion.valid() || (suggested < kFar * used && used < kFar * suggested)) return "";
+  return "the default of --voxel-size, " + significant(used, 3) +
+         ", may not suit these clouds: auto would be " + significant(suggested, 3);
 }
 
 Context MethodOptions::context() const {

@@ -49,6 +49,10 @@ struct MethodOptions {
   /// InvalidArgument without a suggestion.
   void choose_voxel_size(const std::vector<PointCloudView>& clouds, const std::string& what);
 
+  /// Where no size was given, and --voxel-size auto would be far from the default: a sentence that
+  /// says so; empty otherwise.
+  std::string suggestion_text(const std::vector<PointCloudView>& clouds) const;
+
   /// Throws BackendUnavailable, InvalidArgument.
   Context context() const;
 

@@ -2,10 +2,13 @@
 #include "options/place_options.hpp"
 
 #include <array>
+#include <iostream>
 #include <sstream>
+#include <utility>
 
 #include "gpureg/error.hpp"
-#include "inputs/cloud_file.hpp"
+#include "gpureg/voxel_size.hpp"
+#include "run/spacing.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -35,9 +38,7 @@ void PlaceOptions::add_to(Verb& verb) {
               "Where a scan was seen from: x,y,z in its frame; none: not known; auto: the file, or "
               "the origin if the surfaces agree with it")
       .show_default();
-  verb.option("--up", up,
-              "Vertical direction x,y,z in scan and map, and perhaps how many degrees it may be "
-              "off (without: 10): 0,0,1,5");
+  up.add_to(verb, "scan and map", "the scan", "the map");
   verb.option("--near", near, "Rough position of a scan: x,y,z,radius in the map");
 }
 
@@ -48,17 +49,42 @@ void PlaceOptions::check() const {
 
 localization::LocatePrior PlaceOptions::prior() const {
   localization::LocatePrior prior;
-  prior.gravity = up_prior(up);
+  prior.gravity = up.prior();
   prior.position = near_prior(near);
   return prior;
 }
 
-void choose_voxel_size(MethodOptions& method, const MapInput& input) {
+namespace {
+
+/// Clouds of a file, or some of a folder of scans with poses.
+std::vector<PointCloud> sample_of(const std::string& path) { return MapInput(path).sample(); }
+
+void choose_automatic(MethodOptions& method, const MapInput& input,
+                      const std::vector<std::string>& scans) {
+  constexpr std::size_t kMost = 8;  // scans that are asked
+  std::vector<PointCloud> clouds;
+  const std::size_t count = std::min(scans.size(), kMost);
+  for (std::size_t k = 0; k < count; ++k)
+    for (PointCloud& cloud : sample_of(scans[k * scans.size() / count]))
+      clouds.push_back(std::move(cloud));
+  const std::vector<PointCloud> of_map = input.sample();
+  method.choose_voxel_size(views_of(scans.empty() ? of_map : clouds),
+                           scans.empty() ? input.path : scans.front());
+  if (const VoxelSizeSuggestion map = suggest_voxel_size(views_of(of_map)); map.valid())
+    method.voxel_size = std::max(method.voxel_size, static_cast<float>(map.spacing));
+  std::cerr << "gpureg: note: --voxel-size auto is "
+            << significant(static_cast<double>(method.voxel_size), 3) << std::endl;
+}
+
+}  // namespace
+
+void choose_voxel_size(MethodOptions& method, const MapInput& input,
+                       const std::vector<std::string>& scans) {
   if (!input.saved) {
-    if (method.automatic_voxel_size && input.kind == MapInput::Kind::cloud)
-      method.choose_voxel_size({read_cloud(input.path, 0, MeshNote::none).view()}, input.path);
-    else if (method.automatic_voxel_size)
-      throw InvalidArgument("--voxel-size auto is for a map that is one cloud; give the size");
+    if (method.automatic_voxel_size) choose_automatic(method, input, scans);
+    if (method.given("--voxel-size") || scans.empty()) return;
+    const std::string note = method.suggestion_text(views_of(sample_of(scans.front())));
+    if (!note.empty()) std::cerr << "gpureg: note: " << note << std::endl;
     return;
   }
   const float of_map = input.saved->options().prepare.voxel_size;

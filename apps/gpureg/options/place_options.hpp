@@ -13,7 +13,8 @@ namespace gpureg::cli {
 /// What the user knows of scans that are looked for in a map.
 struct PlaceOptions {
   ViewpointChoice viewpoint;
-  std::string up, near;
+  UpChoice up;  // of scan and map
+  std::string near;
 
   void add_to(Verb& verb);
   /// @throws InvalidArgument naming option and text.
@@ -21,9 +22,11 @@ struct PlaceOptions {
   localization::LocatePrior prior() const;
 };
 
-/// Voxel size of a saved map, or what the options say.
+/// Voxel size of a saved map, or what the options say; auto: it suits the scans, and is not below
+/// the spacing of the map. Without scans it suits the map.
 /// @throws InvalidArgument where they contradict each other.
-void choose_voxel_size(MethodOptions& method, const MapInput& input);
+void choose_voxel_size(MethodOptions& method, const MapInput& input,
+                       const std::vector<std::string>& scans);
 
 /// With the confidence that --min-score or --set asks for, if one does.
 localization::LocateOptions locate_options(const MethodOptions& method);

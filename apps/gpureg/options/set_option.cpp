@@ -4,9 +4,11 @@
 #include <cerrno>
 #include <cstdlib>
 #include <limits>
+#include <vector>
 
 #include "fields/options.hpp"
 #include "gpureg/error.hpp"
+#include "text.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -57,10 +59,10 @@ template <typename T>
 void assign(T& options, Assignment& a) {
   const std::string name = a.take_name();
   bool known = false;
-  std::string names;
+  std::vector<std::string> names;
   fields::each<T>([&](const std::string& field, auto member, const fields::Field&) {
     using M = std::decay_t<decltype(options.*member)>;
-    names += (names.empty() ? "" : ", ") + field;
+    names.push_back(field);
     if (field != name || known) return;
     if constexpr (fields::is_described<M>) {
       known = true;
@@ -70,7 +72,12 @@ void assign(T& options, Assignment& a) {
       parse(a, options.*member);
     }
   });
-  if (!known) a.refuse("there is no such option, only " + names);
+  if (known) return;
+  std::string list;
+  for (const std::string& field : names) list += (list.empty() ? "" : ", ") + field;
+  const std::string meant = nearest(name, names);
+  a.refuse("there is no such option" + (meant.empty() ? "" : ", did you mean " + meant + "?") +
+           ", only " + list);
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ std::string run_facts(const Json& document) {
   std::string facts;
   for (const std::string& text :
        {fact("gpureg ", "/environment/version", "") + fact(" on ", "/environment/description", ""),
-        fact("voxel size ", "/options/prepare/voxel_size", " m"), effort_per_pair(document),
+        fact("voxel size ", "/options/prepare/voxel_size", ""), effort_per_pair(document),
         fact("random seed ", "/options/seed", "")})
     if (!text.empty()) facts += (facts.empty() ? "" : " &middot; ") + escaped(text);
   return facts.empty() ? "" : "<p class=\"sub\">" + facts + "</p>\n";
@@ -64,10 +64,16 @@ std::string summary(const ResultFile& result) {
                                      [](const PairRecord& pair) { return pair.aligned; });
   const std::size_t fragments =
       d.contains("fragments") && d["fragments"].is_array() ? d["fragments"].size() : 0;
+  std::map<std::string, std::size_t> reasons;
+  for (const PairRecord& pair : result.pairs)
+    if (!pair.aligned) ++reasons[pair.reason];
   std::string html = run_facts(d) + "<p>" + std::to_string(result.pairs.size()) +
                      (result.pairs.size() == 1 ? " pair of " : " pairs of ") +
                      std::to_string(fragments) + " fragments were tried, " +
                      std::to_string(aligned) + " reported as aligned. ";
+  if (!reasons.empty())
+    html += std::to_string(result.pairs.size() - static_cast<std::size_t>(aligned)) +
+            " are not: " + escaped(counted(reasons)) + ". ";
   html += "A pair took " + significant(result.mean_milliseconds(), 3) +
           " ms on average, the preparation of a fragment " +
           significant(result.mean_prepare_milliseconds(), 3) + " ms";

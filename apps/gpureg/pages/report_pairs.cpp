@@ -88,6 +88,14 @@ std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth
   return curve;
 }
 
+namespace {
+
+std::string reason(const PairRecord& pair) {
+  return ": " + pair.reason + (pair.explanation.empty() ? "" : ", " + pair.explanation);
+}
+
+}  // namespace
+
 std::vector<SamplePair> samples(const ResultFile& result,
                                 const std::vector<EvaluatedPair>& evaluated, std::size_t each) {
   std::vector<const PairRecord*> correct, false_positive, missed;
@@ -105,8 +113,8 @@ std::vector<SamplePair> samples(const ResultFile& result,
   take(chosen, result, median_and_lowest(correct), each, "Correct", no_remark);
   take(chosen, result, false_positive, each, "False positive", no_remark);
   take(chosen, result, missed, each, "Missed", [&](const PairRecord& pair) {
-    if (!pair.transform) return ": " + pair.reason;
-    return ": " + pair.reason + "; the best candidate is " +
+    if (!pair.transform) return reason(pair);
+    return reason(pair) + "; the best candidate is " +
            (candidate_correct[&pair] ? "correct" : "false");
   });
   return chosen;
@@ -121,7 +129,7 @@ std::vector<SamplePair> samples(const ResultFile& result, std::size_t most) {
   for (std::size_t k = 0; k < count; ++k) {
     const PairRecord& pair = *pairs[count < 2 ? 0 : k * (pairs.size() - 1) / (count - 1)];
     chosen.push_back({&pair, pair.aligned ? "Aligned" : "Not aligned",
-                      names(result, pair) + (pair.aligned ? "" : ": " + pair.reason)});
+                      names(result, pair) + (pair.aligned ? "" : reason(pair))});
   }
   return chosen;
 }

@@ -101,9 +101,8 @@ std::string pair_table(const ResultFile& result, const std::vector<PairRow>& row
                        const std::vector<EvaluatedPair>& evaluated, bool unfolded) {
   std::map<const PairRecord*, std::string> outcomes;
   for (const EvaluatedPair& e : evaluated) outcomes[e.pair] = outcome(e);
-  std::vector<std::string> titles = {"target i", "source j", "status",  "reason",
-                                     "score",    "rmse, m",  "matches", "survivors",
-                                     "scored",   "inliers",  "ms"};
+  std::vector<std::string> titles = {"target i", "source j",  "status", "reason",  "score", "rmse",
+                                     "matches",  "survivors", "scored", "inliers", "ms"};
   if (!evaluated.empty()) titles.push_back("evaluation");
   std::string html = "<table>\n" + table_row(titles, "th");
   std::vector<std::size_t> order(result.pairs.size());
@@ -156,7 +155,8 @@ std::string options_table(const Json& document, bool unfolded) {
          folded("Every option of this run", unfolded,
                 "<table class=\"options\">\n" + table_row({"stage", "option", "value"}, "th") +
                     general + stages +
-                    "</table>\n<p class=\"sub\">Lengths in metres, angles in degrees.</p>\n");
+                    "</table>\n<p class=\"sub\">Lengths in the unit of the clouds, angles in "
+                    "degrees.</p>\n");
 }
 
 }  // namespace gpureg::cli

@@ -16,7 +16,7 @@ RegistrationStatus status_of(const std::string& text) {
 
 /// Other programs have reasons of their own.
 RegistrationReason reason_of(const std::string& text) {
-  for (int k = 0; k <= static_cast<int>(RegistrationReason::cancelled); ++k)
+  for (int k = 0; k <= static_cast<int>(kLastRegistrationReason); ++k)
     if (text == to_string(static_cast<RegistrationReason>(k)))
       return static_cast<RegistrationReason>(k);
   return RegistrationReason::none;
@@ -49,6 +49,8 @@ PairRecord record_from_json(const Json& pair) {
   const RegistrationStatus status = status_of(text_member(pair, "status"));
   record.aligned = status != RegistrationStatus::not_aligned;
   record.reason = text_member(pair, "reason");
+  if (const auto text = pair.find("explanation"); text != pair.end() && text->is_string())
+    record.explanation = text->get<std::string>();
   record.score = finite_number(member(pair, "score"), "score");
   const Json& pose = member(pair, "T_ij");
   if (!pose.is_null()) record.transform = rigid_motion(pose, "T_ij");

@@ -20,6 +20,7 @@ struct PairRecord {
   int i = 0, j = 0;
   bool aligned = false;
   std::string reason;
+  std::string explanation;  ///< empty where the file has none
   double score = 0;
   /// probability of a correct pose and of 30 % overlap, where estimated
   std::optional<double> strict_score;

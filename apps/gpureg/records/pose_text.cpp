@@ -10,8 +10,7 @@ std::string pose_text(const Eigen::Matrix4d& pose) {
   for (int row = 0; row < 4; ++row) {
     text += "   ";
     for (int column = 0; column < 4; ++column) {
-      const bool rotation = column < 3;
-      text += " " + pad_left(fixed(pose(row, column), rotation ? 12 : 6), rotation ? 15 : 16);
+      text += " " + pad_left(shortest(pose(row, column)), 23);
     }
     text += "\n";
   }

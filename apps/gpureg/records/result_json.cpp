@@ -30,6 +30,7 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
   Json json;
   json["status"] = to_string(result.status);
   json["reason"] = to_string(result.reason);
+  if (!result.aligned()) json["explanation"] = explain(result);
   json["score"] = result.score;
   if (result.flat) json["flat"] = true;
   json["inlier_ratio"] = result.inlier_ratio;

@@ -13,8 +13,8 @@ namespace gpureg::cli {
 /// Numbers row by row.
 Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
 
-/// status, reason, score, inlier_ratio, inlier_rmse, the pose under the given name (null where
-/// there is none), statistics, ms.
+/// status, reason, explanation (of what is not aligned), score, inlier_ratio, inlier_rmse, the pose
+/// under the given name (null where there is none), statistics, ms.
 Json to_json(const RegistrationResult& result, const char* pose_name);
 
 /// Version and backend of the run.

@@ -15,6 +15,7 @@
 #include "records/result_json.hpp"
 #include "run/interrupt.hpp"
 #include "run/progress.hpp"
+#include "run/spacing.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -97,9 +98,7 @@ void choose_voxel_size(MethodOptions& method, const ScanInput& input, const std:
       // One that cannot be read is left out of the run, and named there.
       if (k + 1 == count && clouds.empty()) throw;
     }
-  std::vector<PointCloudView> views;
-  for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
-  method.choose_voxel_size(views, input.path);
+  method.choose_voxel_size(views_of(clouds), input.path);
 }
 
 PairRun::PairRun(const PreparedFolder& scene, const Pairs& pairs,

@@ -73,6 +73,12 @@ double median_spacing(const std::vector<Eigen::Vector3f>& points, int rank) {
   return *middle;
 }
 
+std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds) {
+  std::vector<PointCloudView> views;
+  for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
+  return views;
+}
+
 double extent_of(const std::vector<Eigen::Vector3f>& points) {
   const Eigen::AlignedBox3f box = box_of(finite_points(points));
   return box.isEmpty() ? 0 : box.sizes().cast<double>().maxCoeff();
@@ -95,8 +101,7 @@ void note_few_points(const std::vector<std::pair<std::string, std::size_t>>& pre
   std::cerr << "gpureg: note: --voxel-size auto leaves " << fewest->second << " points of "
             << fewest->first
             << (few > 1 ? ", and fewer than 1,000 of " + std::to_string(few - 1) + " more" : "")
-            << "; too few for a reliable result, give a smaller size if the cloud has more"
-            << std::endl;
+            << ": too few for a reliable result, a larger part of the place has more" << std::endl;
 }
 
 }  // namespace gpureg::cli

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "gpureg/point_cloud.hpp"
+
 namespace gpureg::cli {
 
 /// The points with finite coordinates.
@@ -14,6 +16,8 @@ std::vector<Eigen::Vector3f> finite_points(const std::vector<Eigen::Vector3f>& p
 /// Median distance from a sample of the points to their nearest (or rank-th nearest) neighbour that
 /// is not at the same place; 0 where there is none. The points must be finite.
 double median_spacing(const std::vector<Eigen::Vector3f>& points, int rank = 1);
+
+std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds);
 
 /// Longest side of the box around the finite points; 0 where there are fewer than two.
 double extent_of(const std::vector<Eigen::Vector3f>& points);

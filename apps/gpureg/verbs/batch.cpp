@@ -171,8 +171,8 @@ class Batch {
                 << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
       if (has_table())
         std::cout << "names      of the numbers in the log: " << scan_table_of(o_.log) << "\n";
-      for (const auto& [reason, count] : reasons_)
-        std::cout << "not        " << count << ", " << reason << "\n";
+      if (!reasons_.empty())
+        std::cout << "not        " << run_->done() - aligned_ << ": " << counted(reasons_) << "\n";
       std::cout << "memory     " << fixed(peak_memory_mib(), 0) << " MiB at most\n";
     }
     if (!scene_.unusable.empty()) return kIncomplete;

@@ -89,7 +89,7 @@ int run(Options o) {
   if (!o.pose.empty()) pose = read_pose(o.pose);
   const Context context = o.method.context();
   const MapInput input(o.map, o.recursive);
-  choose_voxel_size(o.method, input);
+  choose_voxel_size(o.method, input, {o.scan});
   const LocateOptions options = locate_options(o.method);
   MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
   of_map.prepare = options.registration.prepare;
@@ -138,8 +138,9 @@ void add_change(CommandLine& line) {
   verb.option("--pose", o->pose,
               "File with map_from_scan, a 4 x 4 matrix row by row, which is refined; without, the "
               "scan is located");
-  verb.option("--tolerance", o->tolerance,
-              "Surfaces closer together are the same, metres (without: a voxel)");
+  verb.option(
+      "--tolerance", o->tolerance,
+      "Surfaces closer together are the same, in the unit of the clouds (without: a voxel)");
   verb.option("--scan-ply", o->scan_ply, "Write the scan with labels, probabilities and colours");
   verb.option("--map-ply", o->map_ply, "Write the map with labels, probabilities and colours");
   verb.option("--json", o->json, "Write pose and numbers of points");

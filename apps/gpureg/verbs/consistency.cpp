@@ -67,8 +67,12 @@ void make_consistent(const PairRecord& record, const PairConsistency& pair, doub
   json["score"] = pair.confidence;
   json["status"] =
       to_string(aligned ? RegistrationStatus::aligned : RegistrationStatus::not_aligned);
-  json["reason"] =
-      to_string(aligned ? RegistrationReason::none : RegistrationReason::confidence_too_low);
+  if (aligned != record.aligned) {
+    const auto reason = aligned ? RegistrationReason::none : RegistrationReason::contradicts_loops;
+    json["reason"] = to_string(reason);
+    json["explanation"] = explain(reason);
+    if (aligned) json.erase("explanation");
+  }
   if (const auto modes = json.find("modes"); modes != json.end() && !modes->empty()) {
     std::rotate(modes->begin(), modes->begin() + pair.mode, modes->begin() + pair.mode + 1);
     Json& first = modes->front();

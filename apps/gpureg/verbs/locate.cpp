@@ -81,6 +81,13 @@ void print(const std::string& file, const LocateResult& result) {
               << percent(pose.verification.inlier_ratio) << " %, map_from_scan\n";
     std::cout << pose_text(pose.map_from_scan.matrix());
   }
+  constexpr double kLittle = 0.05;
+  if (result.status == LocateStatus::found &&
+      result.poses.front().verification.inlier_ratio < kLittle)
+    std::cerr << "gpureg: note: only " << percent(result.poses.front().verification.inlier_ratio)
+              << " % of " << file
+              << " lies on the map under this pose: is it the scan, and the map the last argument?"
+              << std::endl;
 }
 
 std::vector<PointCloud> read_scans(const LocateRun& o, const Context& context,
@@ -143,7 +150,9 @@ int run(LocateRun o) {
   const Context context = o.method.context();
   o.scans = scans_in(o);
   const MapInput input(o.map(), o.recursive);
-  choose_voxel_size(o.method, input);
+  std::vector<std::string> paths;
+  for (const LocatedScan& scan : o.scans) paths.push_back(scan.path);
+  choose_voxel_size(o.method, input, paths);
   const LocateOptions options = locate_options(o.method);
   MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
   of_map.prepare = options.registration.prepare;
@@ -164,6 +173,10 @@ int run(LocateRun o) {
     print(o.scans[k].path, results[k]);
     all = all && results[k].status == LocateStatus::found;
   }
+  if (!all)
+    std::cout
+        << "try      is the scan of this place, in the unit of the map, and the map sharp (its "
+           "poses)? Then --up, --near, another --voxel-size\n";
   std::cout << "seconds  " << fixed(seconds, 2) << "\n";
   if (!o.json.empty()) write_json(o, context, map, options, results, seconds);
   return all ? kOk : kNoAlignment;

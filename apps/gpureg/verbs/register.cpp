@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -15,11 +16,13 @@
 #include "gpureg/overlay.hpp"
 #include "gpureg/registration.hpp"
 #include "gpureg/time_budget.hpp"
+#include "gpureg/voxel_size.hpp"
 #include "inputs/cloud_file.hpp"
 #include "inputs/initial_poses.hpp"
 #include "json/fields_json.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
+#include "option_names.hpp"
 #include "options/knowledge_options.hpp"
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
@@ -42,7 +45,7 @@ struct RegisterOptions {
   std::string initial;  // file of poses that are verified instead of a search
   bool refine_initial = false, ignore_alternatives = false;
   ViewpointChoice source_viewpoint, target_viewpoint;
-  std::string up;
+  UpChoice up;
 };
 
 std::string describe(const PrepareStatistics& s) {
@@ -59,6 +62,76 @@ std::string describe(const PrepareStatistics& s) {
                                  : "");
 }
 
+/// A pose that was given, and brings next to nothing together, may be of another convention.
+std::string next_step(const RegisterOptions& o, RegistrationReason reason) {
+  if (!o.initial.empty() && (reason == RegistrationReason::no_candidate ||
+                             reason == RegistrationReason::too_little_overlap))
+    return "is the pose target_from_source, not its inverse, and in the unit of the clouds?";
+  std::string next = in_option_names(advice(reason));
+  const bool nowhere = reason == RegistrationReason::too_little_overlap ||
+                       reason == RegistrationReason::no_candidate ||
+                       reason == RegistrationReason::contradicts_prior ||
+                       reason == RegistrationReason::contradicts_free_space;
+  if (!o.up.empty() && nowhere)
+    next += "; is up the same direction in both clouds? Else --source-up and --target-up";
+  return next;
+}
+
+/// After the status: the reason with its numbers, and what to try.
+void print_reason(const RegisterOptions& o, const RegistrationResult& r) {
+  if (r.aligned()) {
+    std::cout << "\n";
+    return;
+  }
+  std::cout << ": " << to_string(r.reason) << ", " << explain(r) << "\n";
+  if (const std::string next = next_step(o, r.reason); !next.empty())
+    std::cout << "try      " << next << "\n";
+}
+
+/// On stderr, what may be a mistake of the caller and is none of the clouds alone.
+void note_pair(const RegisterOptions& o, const PointCloud& source, const PointCloud& target,
+               bool aligned) {
+  // Parts of scenes differ by the ratios of feet, inches and centimetres, too.
+  const std::string units =
+      question_units(source.view(), target.view(), aligned ? kSuspectRatio : kLeastUnitRatio);
+  for (const std::string& note : {units, o.method.suggestion_text({source.view(), target.view()})})
+    if (!note.empty()) std::cerr << "gpureg: note: " << note << std::endl;
+  std::error_code ignored;
+  if (std::filesystem::equivalent(o.source, o.target, ignored))
+    std::cerr << "gpureg: note: SOURCE and TARGET are the same file" << std::endl;
+  if (source.model && target.model)
+    std::cerr << "gpureg: note: both clouds are models, seen from everywhere; the confidence was "
+                 "fitted to a scan and its model"
+              << std::endl;
+}
+
+/// Calls action(), and asks in its refusal what both clouds suggest: other units, another voxel
+/// size. stderr stays one line.
+template <typename Action>
+auto asking(const RegisterOptions& o, const PointCloud& source, const PointCloud& target,
+            const Action& action) {
+  try {
+    return action();
+  } catch (const InvalidArgument& error) {
+    std::string message = error.what();
+    for (const std::string& more : {question_units(source.view(), target.view(), kLeastUnitRatio),
+                                    o.method.suggestion_text({source.view(), target.view()})})
+      if (!more.empty()) message += (message.back() == '?' ? " " : "; ") + more;
+    throw InvalidArgument(message);
+  }
+}
+
+/// On stderr, where an aligned pair overlaps so little that the confidence has to be doubted.
+void note_little_overlap(const RegistrationResult& r) {
+  constexpr double kLittle = 0.05;
+  if (!r.aligned() || r.modes.empty()) return;
+  const PoseEvidence& e = r.modes.front().evidence;
+  const double overlap = std::max(e.source_overlap, e.target_overlap);
+  if (overlap < kLittle)
+    std::cerr << "gpureg: note: the clouds overlap by " << percent(overlap)
+              << " % only under this pose: look at it (--image) before you rely on it" << std::endl;
+}
+
 void print_report(const RegisterOptions& o, const Context& context, const PreparedCloud& source,
                   const PreparedCloud& target, const RegistrationResult& r) {
   const RegistrationStatistics& s = r.statistics;
@@ -68,13 +141,12 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
             << "target   " << o.target << ": " << describe(b) << "\n"
             << "backend  " << context.description() << "\n"
             << "status   " << to_string(r.status);
-  if (!r.aligned()) std::cout << ": " << to_string(r.reason) << ", " << explain(r.reason);
-  std::cout << "\n";
+  print_reason(o, r);
   if (r.has_candidate) {
     std::cout << (r.aligned() ? "target_from_source\n" : "best candidate, target_from_source\n")
               << pose_text(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
               << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
-              << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+              << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << "\n";
     if (r.equivalent_poses() > 1)
       std::cout << "symmetry " << r.equivalent_poses() << " equivalent poses, confidence "
                 << fixed(r.symmetry_confidence(), 3) << " together\n";
@@ -100,12 +172,12 @@ void print_verified(const RegisterOptions& o, const Context& context, const Prep
             << "target   " << o.target << ": " << describe(target.statistics()) << "\n"
             << "backend  " << context.description() << "\n"
             << "status   " << to_string(r.status);
-  if (!r.aligned()) std::cout << ": " << to_string(r.reason) << ", " << explain(r.reason);
-  std::cout << "\ntarget_from_source" << (o.refine_initial ? ", refined" : "") << "\n"
+  print_reason(o, r);
+  std::cout << "target_from_source" << (o.refine_initial ? ", refined" : "") << "\n"
             << pose_text(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
             << ", inliers " << grouped(r.statistics.inliers) << " of "
             << grouped(r.statistics.points_scored) << " (" << percent(r.inlier_ratio)
-            << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+            << " %), rmse " << significant(r.inlier_rmse, 3) << "\n";
   for (const RegistrationMode& mode : r.modes)
     std::cout << "pose " << mode.rank_before_refinement + 1 << " of " << o.initial
               << ": confidence " << fixed(mode.confidence, 3) << ", overlap "
@@ -126,7 +198,8 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
   json["source"] = {{"file", o.source}, {"prepare", to_json(source.statistics())}};
   json["target"] = {{"file", o.target}, {"prepare", to_json(target.statistics())}};
   json["result"] = to_json(result, "target_from_source");
-  json["result"]["explanation"] = explain(result.reason);
+  json["result"]["explanation"] = explain(result);
+  json["result"]["advice"] = next_step(o, result.reason);
   json["result"]["information_redwood"] = to_json(result.source_moments.information_redwood());
   json["result"]["information_open3d"] = to_json(result.target_moments.information_open3d());
   json["peak_memory_mib"] = peak_memory_mib();
@@ -141,11 +214,9 @@ RegistrationResult verify(const RegisterOptions& o, const Context& context,
   VerificationOptions verification;
   verification.refine = o.refine_initial;
   verification.search_alternatives = !o.ignore_alternatives;
-  RegistrationResult result = result_of(
-      verify_poses(context, source, target, poses, options, verification), options.min_confidence);
-  result.statistics.source_points = static_cast<std::uint32_t>(source.size());
-  result.statistics.target_points = static_cast<std::uint32_t>(target.size());
-  return result;
+  return result_of(verify_poses(context, source, target, poses, options, verification),
+                   options.min_confidence, static_cast<std::uint32_t>(source.size()),
+                   static_cast<std::uint32_t>(target.size()));
 }
 
 /// Both clouds. A mesh is sampled at the spacing of the other cloud.
@@ -191,7 +262,7 @@ int run(RegisterOptions o) {
   o.source_viewpoint.check("--source-viewpoint");
   o.target_viewpoint.check("--target-viewpoint");
   RegistrationPrior prior;
-  prior.gravity = up_prior(o.up);
+  prior.gravity = o.up.prior();
   if (o.time_budget && !prior.empty())
     throw InvalidArgument("--up and --time-budget do not go together");
   check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}},
@@ -211,19 +282,25 @@ int run(RegisterOptions o) {
                              o.source + " and " + o.target);
   const RegistrationOptions options = o.method.registration();
   o.method.note_calibration();
-  check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
-  check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
+  const auto asking_pair = [&](const auto& action) {
+    return asking(o, source_cloud, target_cloud, action);
+  };
+  asking_pair([&] {
+    check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
+    check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
+  });
   ViewpointNote viewpoints;
   if (options.prepare.depth_maps > 0) {
     viewpoints.see(source_cloud, o.source);
     viewpoints.see(target_cloud, o.target);
   }
-  viewpoints.print();
   const auto prepared = [&](const PointCloudView& cloud, const std::string& file) {
-    return prepare_batch(context, {cloud}, options.prepare, {file}).front();
+    return asking_pair(
+        [&] { return prepare_batch(context, {cloud}, options.prepare, {file}).front(); });
   };
   const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
   const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
+  viewpoints.print();
   o.source_viewpoint.note_place("--source-viewpoint", source, o.source);
   o.target_viewpoint.note_place("--target-viewpoint", target, o.target);
   if (o.method.automatic_voxel_size)
@@ -239,6 +316,8 @@ int run(RegisterOptions o) {
     print_report(o, context, source, target, result);
   else
     print_verified(o, context, source, target, result);
+  note_little_overlap(result);
+  note_pair(o, source_cloud, target_cloud, result.aligned());
   if (o.time_budget)
     std::cout << "budget   " << fixed(*o.time_budget, 1) << " ms, " << fixed(timed.milliseconds, 1)
               << " used; " << timed.levels << " levels of quality up to " << timed.highest_quality
@@ -295,9 +374,7 @@ void add_register(CommandLine& line) {
           "its normals point outwards; auto: the file, or the origin if the surfaces agree with it")
       .show_default();
   verb.option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET").show_default();
-  verb.option("--up", o->up,
-              "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
-              "off (without: 10): 0,0,1,5");
+  o->up.add_to(verb, "both clouds", "SOURCE", "TARGET");
   verb.option("--json", o->json, "Write options, result, counts and times");
   verb.option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb.option("--image", o->image, "Draw both clouds before and after, as PNG");
