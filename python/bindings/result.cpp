@@ -127,7 +127,7 @@ RegistrationStatus status_from(const std::string& name) {
 }
 
 RegistrationReason reason_from(const std::string& name) {
-  for (int k = 0; k <= static_cast<int>(RegistrationReason::cancelled); ++k)
+  for (int k = 0; k <= static_cast<int>(kLastRegistrationReason); ++k)
     if (const auto r = static_cast<RegistrationReason>(k); name == to_string(r)) return r;
   throw py::value_error("reason: '" + name + "' is none");
 }
@@ -186,9 +186,17 @@ void bind_registration_result(py::module_& m) {
           "\"skipped\" (never tried).")
       .def_property_readonly(
           "reason", [](const R& r) { return to_string(r.reason); },
-          "Why the pair is not aligned; \"none\" where it is.")
+          "Why the pair is not aligned; \"none\" where it is. Of a pose without confidence, as "
+          "diagnosed from its evidence: \"too_few_points\", \"no_candidate\", "
+          "\"too_little_overlap\", \"underconstrained\", \"ambiguous\", "
+          "\"contradicts_free_space\", \"clutter\", \"outside_fitted_range\", \"symmetric\", or "
+          "\"confidence_too_low\" where nothing stands out.")
       .def_property_readonly(
-          "explanation", [](const R& r) { return explain(r.reason); }, "The reason as a sentence.")
+          "explanation", [](const R& r) { return explain(r); },
+          "The reason as a sentence, with its numbers.")
+      .def_property_readonly(
+          "advice", [](const R& r) { return advice(r.reason); },
+          "What to try next; empty where there is nothing.")
       .def_property_readonly(
           "aligned", &R::aligned,
           "A pose is reported: status \"aligned\" or \"aligned_up_to_symmetry\".")

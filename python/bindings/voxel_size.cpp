@@ -51,6 +51,21 @@ void bind_voxel_size(py::module_& m) {
         return suggest_voxel_size(views);
       },
       py::arg("clouds"));
+  m.def(
+      "question_units",
+      [](const FloatArray& source, const FloatArray& target, bool failed) {
+        const auto view_of = [](const FloatArray& array, const char* name) {
+          const Rows rows = rows_of(array, name);
+          PointCloudView view(rows.data, rows.count);
+          view.point_stride = rows.stride;
+          return view;
+        };
+        const PointCloudView a = view_of(source, "source"), b = view_of(target, "target");
+        const py::gil_scoped_release release;
+        return question_units(a, b, failed ? kLeastUnitRatio : kSuspectRatio);
+      },
+      py::arg("source"), py::arg("target"), py::arg("failed"),
+      "Asks whether the units differ; empty where the extents do not suggest it.");
 }
 
 }  // namespace gpureg::python

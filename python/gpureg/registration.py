@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
+
+import numpy as np
 
 from . import _core
 from ._arrays import core_cloud, host_points, index_pairs, is_one_cloud, several
 from ._contexts import checked, context_of, milliseconds_of
 from ._core import (
     Context,
+    InvalidArgument,
     PreparedCloud,
     PrepareOptions,
     RegistrationOptions,
@@ -267,7 +271,13 @@ def register(
     -------
     RegistrationResult
         ``target_from_source`` moves points of the source into the target's frame:
-        ``p_target = R p_source + t``. As a condition, a result is its ``aligned``.
+        ``p_target = R p_source + t``. As a condition, a result is its ``aligned``. Where it is
+        not, ``explanation`` and ``advice`` say why and what to try.
+
+    Warns
+    -----
+    UserWarning
+        Where the extents suggest that the clouds have different units.
 
     Examples
     --------
@@ -314,7 +324,24 @@ def register(
     ):
         clouds.append(core_cloud(cloud, None, None, viewpoint, options.prepare, name, device))
     options.validate()
-    a, b = _core.prepare_batch(context, clouds, options.prepare, ["source", "target"])
+    try:
+        a, b = _core.prepare_batch(context, clouds, options.prepare, ["source", "target"])
+    except InvalidArgument as error:
+        question = _unit_question(clouds, True)
+        raise InvalidArgument(f"{error}; {question}") if question else error from None
     if time_budget_ms is not None:
-        return _core.align_within(context, a, b, time_budget_ms, options).result
-    return _core.align(context, a, b, options, None, prior)
+        result = _core.align_within(context, a, b, time_budget_ms, options).result
+    else:
+        result = _core.align(context, a, b, options, None, prior)
+    question = _unit_question(clouds, not result.aligned)
+    if question:
+        warnings.warn(question, UserWarning, stacklevel=2)
+    return result
+
+
+def _unit_question(clouds: list[Any], failed: bool) -> str:
+    """Ask whether the units of both clouds differ; empty on the device, and where they need not."""
+    source, target = (cloud[0] for cloud in clouds)
+    if not (isinstance(source, np.ndarray) and isinstance(target, np.ndarray)):
+        return ""
+    return _core.question_units(source, target, failed)

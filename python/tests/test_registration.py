@@ -97,10 +97,27 @@ def test_seed_and_voxel_size_are_used(source, target):
 def test_no_alignment_is_a_status(source):
     result = gpureg.register(source, np.random.default_rng(0).random((9000, 3)), quality=1)
     assert result.status == "not_aligned" and not result.aligned and not result
-    assert result.reason == "confidence_too_low" and result.score < 0.5
-    assert result.explanation
+    assert result.reason in ("too_little_overlap", "clutter") and result.score < 0.5
+    assert "% of the" in result.explanation and result.advice
     if not result.has_candidate:
         assert np.isnan(result.target_from_source).all()
+
+
+def test_reasons_have_names_numbers_and_advice(source):
+    few_points = gpureg.register(source, source[:200], 0.1, quality=1)
+    assert few_points.reason == "too_few_points"
+    assert "the target has" in few_points.explanation and "voxel_size" in few_points.advice
+    aligned = gpureg.register(source, source, 0.1, quality=1)
+    assert aligned.explanation == "the clouds were aligned" and aligned.advice == ""
+
+
+@pytest.mark.filterwarnings("error")
+def test_other_units_are_a_question(source):
+    with pytest.warns(UserWarning, match=r"units different\? target is 3\.3 times larger.* feet"):
+        gpureg.register(source, 3.28084 * np.ascontiguousarray(source[::-1]), 0.1, quality=0)
+    with pytest.raises(gpureg.InvalidArgument, match=r"nearly all.*target is 1000 times larger"):
+        gpureg.register(source, 1000 * source, 0.1)
+    assert gpureg.register(source, source, 0.1, quality=1).aligned  # no warning
 
 
 def test_own_features_and_correspondences(source, target, truth):
