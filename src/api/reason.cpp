@@ -149,7 +149,8 @@ std::string overlap_text(const PoseEvidence& e) {
 RegistrationReason diagnose(const RegistrationResult& result) {
   const RegistrationStatistics& s = result.statistics;
   const auto [fewer, more] = std::minmax(s.source_points, s.target_points);
-  if (fewer < kFewPoints) return RegistrationReason::too_few_points;
+  // 2-D scans have few points, and nothing holds them across their plane, which is no lack.
+  if (fewer < kFewPoints && !result.flat) return RegistrationReason::too_few_points;
   if (result.modes.empty() || s.inliers == 0) return RegistrationReason::no_candidate;
   const PoseEvidence& e = result.modes.front().evidence;
   const std::vector<double> similar = similar_confidences(result);
@@ -162,11 +163,13 @@ RegistrationReason diagnose(const RegistrationResult& result) {
   if (contradicts_free_space(e))
     return overlap < kOverlap ? RegistrationReason::too_little_overlap
                               : RegistrationReason::contradicts_free_space;
-  if (free_motion(e, s.inliers) != FreeMotion::none) return RegistrationReason::underconstrained;
+  if (!result.flat && free_motion(e, s.inliers) != FreeMotion::none)
+    return RegistrationReason::underconstrained;
   if (overlap < kOverlap) return RegistrationReason::too_little_overlap;
   if (similar.size() > 1) return RegistrationReason::ambiguous;
-  return fewer < kFewestFitted || more > kMostFitted ? RegistrationReason::outside_fitted_range
-                                                     : RegistrationReason::confidence_too_low;
+  return !result.flat && (fewer < kFewestFitted || more > kMostFitted)
+             ? RegistrationReason::outside_fitted_range
+             : RegistrationReason::confidence_too_low;
 }
 
 std::string explain(const RegistrationResult& result) {
@@ -245,6 +248,8 @@ const char* advice(RegistrationReason reason) {
       return "suggest_voxel_size(), or a calibration to your sensor";
     case RegistrationReason::confidence_too_low:
       return "a calibration to your sensor, or a lower min_confidence";
+    case RegistrationReason::flat_with_solid:
+      return "the points at the scanner's height, cut out of the cloud that is not flat";
     case RegistrationReason::contradicts_loops:
     case RegistrationReason::none:
     case RegistrationReason::cancelled:

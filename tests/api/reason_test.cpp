@@ -142,6 +142,14 @@ TEST(Reason, OutsideTheFittedRange) {
   expect_reason(result, RegistrationReason::outside_fitted_range, "150000 and 6000 points");
 }
 
+TEST(Reason, ScansOf2dScannersHaveFewPointsAndNothingAcross) {
+  RegistrationResult result = unsure();
+  result.flat = true;
+  result.statistics.source_points = 280;
+  result.modes.front().evidence.information_eigenvalues = {0, 0, 0, 500, 1000, 2000};
+  EXPECT_EQ(diagnose(result), RegistrationReason::confidence_too_low);
+}
+
 TEST(Reason, EveryOneHasNameAndSentence) {
   for (int k = 0; k <= static_cast<int>(kLastRegistrationReason); ++k) {
     const auto reason = static_cast<RegistrationReason>(k);
