@@ -117,6 +117,22 @@ TEST_F(Knowledge, TheVerticalDirectionExcludesPoses) {
   const Outcome wrong =
       run(joined({"register", source_, target_, "--up", text(axis.unitOrthogonal(), 5)}, kSmall));
   EXPECT_EQ(wrong.status, 1) << wrong.out;
+  expect_holds(wrong.out, {"--source-up and --target-up"});
+  // Any direction does, where each cloud has its own.
+  const auto own = [](const Eigen::Vector3d& v) {
+    std::ostringstream out;
+    out << v.x() << ',' << v.y() << ',' << v.z();
+    return out.str();
+  };
+  const Eigen::Vector3d up = axis.unitOrthogonal();
+  EXPECT_EQ(aligned({"--source-up", own(up), "--target-up",
+                     own(truth.linear() * up)})["result"]["status"],
+            "aligned");
+  EXPECT_EQ(
+      aligned({"--up", text(up, 5), "--target-up", own(truth.linear() * up)})["result"]["status"],
+      "aligned");
+  refused({"--target-up", "0,0,1"}, {"--target-up needs --up or --source-up"});
+  refused({"--up", "0,0,1", "--source-up", "0,0,1,5"}, {"--source-up is 0,0,1,5", "x,y,z"});
 }
 
 /// An L-shaped prism: closed, and without symmetry but for a mirror.

@@ -53,6 +53,10 @@ TEST_F(Locate, FoundInScansWithPosesAndInTheSavedMapAndStrangersAreNot) {
     EXPECT_NEAR(pose.at("map_from_scan").at(static_cast<std::size_t>(k)).get<double>(),
                 truth.matrix()(k / 4, k % 4), 0.08);
 
+  const Outcome automatic = locate({scan, folder.path()}, {"--voxel-size", "auto"});
+  EXPECT_EQ(automatic.status, 0) << automatic.out << automatic.err;
+  expect_holds(automatic.err, {"note: --voxel-size auto is 0."});
+
   const std::string stranger = write_cloud(other, "stranger.ply", sticks());
   const Outcome nowhere = locate({scan, stranger, map});
   EXPECT_EQ(nowhere.status, 1);
