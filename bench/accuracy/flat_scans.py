@@ -8,12 +8,14 @@ a log of CARMEN). A pair counts as overlapping where 30 % of the points of a sca
 one within 0.15 m under the true poses. A pose is correct where it moves the source by at most 0.2 m RMS
 (real scans: 0.3 m, as their poses are estimates).
 
-usage: flat_scans.py [FOLDER...] [--seeds 1 2 3] [--scans 24] [--work DIR] [-o FILE]
+usage: flat_scans.py [FOLDER...] [--seeds 1 2 3] [--scans 16] [--work DIR] [-o FILE]
        flat_scans.py --header src/confidence/confidence_model.hpp [--work DIR]    fits only
 Needs numpy; --header: what fit_confidence.py needs."""
 
+import functools
 import json
 import pathlib
+import shutil
 import sys
 import tempfile
 
@@ -66,6 +68,7 @@ def share_near(a, b):
     return near / len(a)
 
 
+@functools.cache
 def truth_of(folder):
     """Scans, and (i_from_j, overlap) of all pairs i < j."""
     poses = read_poses(folder / "poses.txt")
@@ -152,10 +155,17 @@ def fit(arguments, generated):
     every = {name: [] for name in fit_confidence.FLAT_MODELS}
     for name, how in FIT.items():
         folder = generated(name, *how)
-        for model, words in (("flat", []), ("flat_surface_sides", ["--viewpoint", "none"])):
+        for model in every:
             result = folder / f"{model}.json"
-            if not result.exists():
-                batch(arguments, folder, 1, result, *words)
+            if result.exists():
+                pass
+            elif model == "flat":
+                batch(arguments, folder, 1, result)
+            else:
+                with tempfile.TemporaryDirectory() as temporary:
+                    unknown = pathlib.Path(temporary) / "scans"
+                    shutil.copytree(folder, unknown, ignore=shutil.ignore_patterns("cameras.txt"))
+                    batch(arguments, unknown, 1, result, "--viewpoint", "none")
             every[model].append(fit_confidence.Run(name, folder, result))
     models = {}
     for name, runs in every.items():
@@ -172,7 +182,7 @@ def main():
     parser = record.parser(__doc__, "flat_scans.json")
     parser.add_argument("folders", nargs="*", type=pathlib.Path)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--scans", type=int, default=24, help="of each building")
+    parser.add_argument("--scans", type=int, default=16, help="of each building")
     parser.add_argument("--voxel-size", default="auto")
     parser.add_argument("--work", type=pathlib.Path, help="folder of the generated scans, kept")
     parser.add_argument("--header", type=pathlib.Path)
@@ -195,19 +205,17 @@ def main():
         return
     folders = {name: generated(name, *how) for name, how in MEASURED.items()}
     folders.update({folder.name: folder for folder in arguments.folders})
-    sets, everything = [], []
-    for name, folder in folders.items():
-        rows = [row for seed in arguments.seeds for row in results(arguments, folder, seed)]
-        sets.append({"set": name, "real": folder in arguments.folders, **figures(rows)})
-        print(json.dumps(sets[-1]), flush=True)
-        if folder not in arguments.folders:
-            everything += rows
-    content = {"seeds": arguments.seeds, "sets": sets, "generated": figures(everything)}
-    record.write(
-        arguments,
-        "bench/accuracy/flat_scans.py " + " ".join(p.name for p in arguments.folders),
-        content,
-    )
+    rows = {name: [] for name in folders}
+    real = [name for name, folder in folders.items() if folder in arguments.folders]
+    command = " ".join(["bench/accuracy/flat_scans.py", *real])
+    for k, seed in enumerate(arguments.seeds):
+        for name, folder in folders.items():
+            rows[name] += results(arguments, folder, seed)
+            print(seed, name, json.dumps(figures(rows[name])), flush=True)
+        sets = [{"set": name, "real": name in real, **figures(rows[name])} for name in rows]
+        every = [row for name in rows if name not in real for row in rows[name]]
+        content = {"seeds": arguments.seeds[: k + 1], "sets": sets, "generated": figures(every)}
+        record.write(arguments, command, content)
 
 
 if __name__ == "__main__":

@@ -518,7 +518,28 @@ def decisions_unseen():
     return [*out, "", f"Made by `bench/accuracy/viewpoints.py` at commit {', '.join(commits)}."]
 
 
+def flat_scans():
+    record = load("flat_scans.json")
+    rows = [
+        "| scans | pairs | overlapping | best candidate correct, % | reported: recall, % | precision, % | recall at precision >= 95 %, % | above 0.9 | of these correct, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    every = {"set": "all generated", **record["generated"]}
+    for of in [*record["sets"], every]:
+        shares = [
+            "-" if of[key] is None else percent(of[key])
+            for key in ("best_candidate_correct", "recall", "precision", "recall_at_95")
+        ]
+        sure = of["correct_above_0.9"]
+        rows.append(
+            f"| {of['set']} | {of['pairs']} | {of['overlapping']} | {' | '.join(shares)} | {of['above_0.9']} | "
+            f"{'-' if sure is None else percent(sure)} |"
+        )
+    return [*rows, "", source(record) + "."]
+
+
 TABLES = {
+    "flat_scans": flat_scans,
     "decisions_unseen": decisions_unseen,
     "domains": domains,
     "calibration": calibration,

@@ -187,17 +187,17 @@ void add_modes(const PairOutcome& outcome, const AlignedPair& pair, Registration
 
 RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair,
                                  const PriorTest& prior) {
-  // Refinement moves poses, so they are asked again.
-  const bool some_contradict =
-      std::any_of(all.modes.begin(), all.modes.end(),
-                  [&](const ModeOutcome& m) { return !permitted(prior, to_rigid(m.pose)); });
+  // Refinement moves poses, so they are asked again. It may also move a 2-D scan out of its plane,
+  // where nothing overlaps and nothing speaks against the pose.
+  const auto forbidden = [&](const ModeOutcome& m) {
+    return !permitted(prior, to_rigid(m.pose)) || (pair.flat() && confidence::without_overlap(m));
+  };
+  const bool some_contradict = std::any_of(all.modes.begin(), all.modes.end(), forbidden);
   PairOutcome kept;
   if (some_contradict) {
     kept = all;
-    kept.modes.erase(
-        std::remove_if(kept.modes.begin(), kept.modes.end(),
-                       [&](const ModeOutcome& m) { return !permitted(prior, to_rigid(m.pose)); }),
-        kept.modes.end());
+    kept.modes.erase(std::remove_if(kept.modes.begin(), kept.modes.end(), forbidden),
+                     kept.modes.end());
   }
   const PairOutcome& outcome = some_contradict ? kept : all;
   RegistrationResult result;
@@ -227,7 +227,8 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
       return result;
     }
     if (!outcome.modes.empty()) add_modes(outcome, pair, result);
-    result.reason = evidence_reason(result, some_contradict && outcome.modes.empty(), pair.options);
+    result.reason = evidence_reason(
+        result, some_contradict && outcome.modes.empty() && !pair.flat(), pair.options);
     result.status = status_of(result, pair.options);
     if (result.reason != RegistrationReason::none && result.statistics.inliers == 0)
       drop_candidate(result);

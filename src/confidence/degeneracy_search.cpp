@@ -70,6 +70,7 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
   for (const ModeOutcome& mode : outcome.modes) {
     // A pose that the prior forbids is not reported.
     if (!permitted(pair.prior, to_rigid(mode.pose))) continue;
+    if (planar_pair(*pair.source, *pair.target) && without_overlap(mode)) continue;
     modes.push_back(&mode);
   }
   if (modes.empty()) return out;

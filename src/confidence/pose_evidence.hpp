@@ -8,6 +8,10 @@
 
 namespace gpureg::confidence {
 
+inline bool without_overlap(const ModeOutcome& mode) {
+  return mode.source.inliers == 0 && mode.target.inliers == 0;
+}
+
 /// Counts of a mode as shares. moved, fixed: the clouds in the engine; swapped: the moved cloud is
 /// the target of the pair.
 PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
