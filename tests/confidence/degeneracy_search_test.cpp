@@ -34,7 +34,8 @@ void match(PairOutcome& outcome, const PreparedState& source, const PreparedStat
   const auto odds = [&](std::uint32_t inliers) {
     mode.matches.inliers = inliers;
     const std::vector<PoseEvidence> evidence{confidence::evidence_of(
-        outcome, mode, confidence::spectra_of({&mode}, source).front(), source, target, false)};
+        outcome, mode, confidence::spectra_of({&mode}, source, target).front(), source, target,
+        false)};
     return confidence::rank_modes(evidence,
                                   confidence::available_evidence(evidence, ViewpointSource::said,
                                                                  ViewpointSource::said))
