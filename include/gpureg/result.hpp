@@ -101,12 +101,12 @@ struct RegistrationResult {
 
 /// The most telling reason why the first mode is not confident, by its evidence, the other modes
 /// and the numbers of points. Does not read status, reason and score.
-/// @return confidence_too_low where no single reason stands out.
+/// @return confidence_too_low if no single reason stands out.
 RegistrationReason diagnose(const RegistrationResult& result);
 
 /// @return result.reason with the numbers of this result: one English sentence without full stop.
 std::string explain(const RegistrationResult& result);
-/// @return what to try next, in the names of this API; "" where there is nothing.
+/// @return what to try next, in the names of this API; "" if there is nothing.
 const char* advice(RegistrationReason reason);
 
 }  // namespace gpureg

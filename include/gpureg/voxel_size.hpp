@@ -41,9 +41,9 @@ struct VoxelSizeSuggestion {
 
 /// Suggests one voxel size for a set of clouds: about 5,000 points of the median cloud remain,
 /// enough for an accurate and fast registration, and the voxel is not below the spacing of the
-/// points. Where the noise exceeds a third of a voxel, it grows until 3,000 points remain. It also
-/// grows where the neighbourhoods of the features have few points, as in sparse LiDAR scans, in
-/// proportion to them, and where most points have their neighbours on one line, as on the rings of
+/// points. If the noise exceeds a third of a voxel, it grows until 3,000 points remain. It also
+/// grows if the neighbourhoods of the features have few points, as in sparse LiDAR scans, in
+/// proportion to them, and if most points have their neighbours on one line, as on the rings of
 /// a LiDAR, until they have an area. 1,000 points remain, of every cloud that has as many (a part
 /// on a scene), as far as the median cloud then keeps at most 100,000 (two clouds) or 20,000
 /// (more). Scans of 2-D scanners keep about 300 points, in layers. Rounded to one or two digits.
@@ -56,11 +56,11 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
 
 /// Ratio of extents that is suspect whatever became of the pair.
 constexpr double kSuspectRatio = 50;
-/// Ratio of feet to metres is the smallest that is worth a question, where a pair did not align: a
+/// Ratio of feet to metres is the smallest that is worth a question, if a pair did not align: a
 /// part is smaller than its scene, too.
 constexpr double kLeastUnitRatio = 2.5;
 
-/// Asks whether two clouds have different units, where the ratio of their extents is that of usual
+/// Asks whether two clouds have different units, if the ratio of their extents is that of usual
 /// units (within 20 %) or above kSuspectRatio. Stray points do not matter. Thread-safe.
 /// @param views host memory.
 /// @param least_ratio no question below.
