@@ -79,7 +79,7 @@ struct RegistrationResult {
   std::vector<RegistrationMode> modes;
   RegistrationStatistics statistics;
   /// Both clouds are scans of a 2-D scanner (PrepareStatistics::flat). All poses move the plane of
-  /// the source onto that of the target, exactly, and the moments are those of points in the planes.
+  /// the source onto that of the target, exactly; the moments are those of points in the planes.
   bool flat = false;
   /// What was known of the places that the clouds were seen from.
   ViewpointSource source_viewpoint = ViewpointSource::said;

@@ -13,7 +13,7 @@ namespace gpureg::cli {
 namespace {
 
 /// Sensors see a small part of a scene, but not from ten times its extent.
-constexpr double kFar = 10;
+constexpr double kFarViewpoint = 10;
 
 /// Distance of the nearest viewpoint from the box around the points; 0 without any.
 double distance_of(const PointCloud& cloud, double& extent) {
@@ -32,7 +32,8 @@ double distance_of(const PointCloud& cloud, double& extent) {
 
 void ViewpointNote::see(const PointCloud& cloud, const std::string& file) {
   double extent = 0;
-  if (const double distance = distance_of(cloud, extent); distance > kFar * extent && extent > 0) {
+  if (const double distance = distance_of(cloud, extent);
+      distance > kFarViewpoint * extent && extent > 0) {
     ++far_clouds_;
     if (distance > farthest_) {
       farthest_ = distance;

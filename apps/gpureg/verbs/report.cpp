@@ -25,8 +25,8 @@
 namespace gpureg::cli {
 namespace {
 
-constexpr std::size_t kPicturesOfAKind = 2;  // with ground truth
-constexpr std::size_t kPictures = 12;        // without; a page of some 6 MB
+constexpr std::size_t kPicturesOfAKind = 2;   // with ground truth
+constexpr std::size_t kPicturesByScore = 12;  // without; a page of some 6 MB
 constexpr const char* kNoPictures = "-";
 constexpr int kPanelWidth = 480, kPanelHeight = 400;
 
@@ -101,7 +101,7 @@ void add_pictures(const std::string& folder, ReportEntry& entry) {
       draw(entry.result,
            entry.truth
                ? samples(entry.result, evaluate_pairs(*entry.truth, entry.result), kPicturesOfAKind)
-               : samples(entry.result, kPictures),
+               : samples(entry.result, kPicturesByScore),
            {folder, recursive});
 }
 
