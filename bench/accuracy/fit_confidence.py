@@ -68,7 +68,7 @@ MODELS = {
     "overlap_alone": Model(False, False),
     "model": Model(False, True, True),
 }
-# Of 2-D scans, which have the same features; see flat_scans.py.
+# Of 2-D scans, which have the same features; see bench/flat_scans.
 FLAT_MODELS = {"flat": Model(True, True), "flat_surface_sides": Model(False, True)}
 ALL_MODELS = {**MODELS, **FLAT_MODELS}
 REGRESSIONS = ("ranking", "confidence", "overlap")

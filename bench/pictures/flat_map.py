@@ -14,8 +14,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "bench"), str(ROOT / "bench/accuracy")]
-from flat_scans import moved, read_ply, read_poses
+sys.path.append(str(ROOT / "bench/flat_scans"))
+from run import moved, read_ply, read_poses
 
 SHOWN = 3  # single scans
 

@@ -227,8 +227,10 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
       return result;
     }
     if (!outcome.modes.empty()) add_modes(outcome, pair, result);
-    result.reason = evidence_reason(
-        result, some_contradict && outcome.modes.empty() && !pair.flat(), pair.options);
+    result.reason =
+        pair.flat() && outcome.modes.empty() && outcome.statistics.scored > 0
+            ? RegistrationReason::confidence_too_low
+            : evidence_reason(result, some_contradict && outcome.modes.empty(), pair.options);
     result.status = status_of(result, pair.options);
     if (result.reason != RegistrationReason::none && result.statistics.inliers == 0)
       drop_candidate(result);

@@ -7,6 +7,7 @@
 #include "common/coordinates.hpp"
 #include "common/rigid.hpp"
 #include "common/validate.hpp"
+#include "flat/planar_pose.hpp"
 #include "math/trigonometry.hpp"
 
 namespace gpureg {
@@ -32,10 +33,6 @@ void require_direction(const Eigen::Vector3d& v, const std::string& name) {
 void require_degrees(double degrees, const std::string& name) {
   require(std::isfinite(degrees) && degrees > 0 && degrees <= 180, name.c_str(), degrees,
           "degrees in (0, 180]");
-}
-
-Eigen::Vector3d normal_of(const ScanPlane& plane) {
-  return Eigen::Vector3d(plane.normal[0], plane.normal[1], plane.normal[2]);
 }
 
 Vec3 to_vec3(const Eigen::Vector3d& v) {

@@ -41,23 +41,24 @@ void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pair
 constexpr std::size_t kRawPointsPerThread = 200'000;
 
 /// The owners of the rows that the engine gets of a cloud.
-struct Rows {
+struct OwnedRows {
   Extruded extruded;
   WithoutStrayPoints kept;
-  Rows(const RawCloud& raw, bool model, const PrepareOptions& options)
+  OwnedRows(const RawCloud& raw, bool model, const PrepareOptions& options)
       : extruded(raw, model, options), kept(extruded.cloud(), options) {}
-  Rows(const Rows&) = delete;
-  Rows& operator=(const Rows&) = delete;
+  OwnedRows(const OwnedRows&) = delete;
+  OwnedRows& operator=(const OwnedRows&) = delete;
 };
 
 /// Replaces clouds by those that the engine gets: 2-D scans in layers, without stray points.
 /// @return the owners of the rows.
 template <typename Naming>
-std::vector<std::optional<Rows>> replace_rows(const Engine& engine, const PrepareOptions& options,
-                                              const Naming& naming,
-                                              std::vector<CloudKnowledge>& knowledge,
-                                              std::vector<RawCloud>& raw) {
-  std::vector<std::optional<Rows>> owners(raw.size());
+std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
+                                                   const PrepareOptions& options,
+                                                   const Naming& naming,
+                                                   std::vector<CloudKnowledge>& knowledge,
+                                                   std::vector<RawCloud>& raw) {
+  std::vector<std::optional<OwnedRows>> owners(raw.size());
   std::size_t points = 0;
   for (const RawCloud& cloud : raw) points += cloud.size;
   const std::size_t workers = std::min<std::size_t>(
@@ -65,7 +66,7 @@ std::vector<std::optional<Rows>> replace_rows(const Engine& engine, const Prepar
   on_threads(workers, [&](std::size_t worker) {
     for (std::size_t k = worker; k < raw.size(); k += workers)
       naming(k, [&] {
-        const Rows& rows = owners[k].emplace(raw[k], knowledge[k].model, options);
+        const OwnedRows& rows = owners[k].emplace(raw[k], knowledge[k].model, options);
         raw[k] = rows.kept.cloud();
         // The origin of the frame may be below the scanner.
         if (rows.extruded.plane().exists() && !knowledge[k].viewpoints && raw[k].viewpoints)
@@ -117,7 +118,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
       };
       for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
         set_frame_offset(clouds[states.size()].origin, *state);
-        const Rows& rows = *owners[states.size()];
+        const OwnedRows& rows = *owners[states.size()];
         state->plane = rows.extruded.plane();
         rows.kept.count(state->statistics);
         rows.extruded.count(state->statistics);

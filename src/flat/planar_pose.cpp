@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "flat/planar_pose.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 namespace gpureg {
 namespace {
-
-Eigen::Vector3d normal_of(const ScanPlane& plane) {
-  return Eigen::Vector3d(plane.normal[0], plane.normal[1], plane.normal[2]);
-}
 
 /// Axes in the plane and its normal as columns: the smallest rotation of z to the normal, which is
 /// not below the xy plane.

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 
 #include "gpureg/result.hpp"
 #include "pipeline/scan_plane.hpp"
 
 namespace gpureg {
+
+inline Eigen::Vector3d normal_of(const ScanPlane& plane) {
+  return Eigen::Vector3d(plane.normal[0], plane.normal[1], plane.normal[2]);
+}
 
 /// The closest pose, at a point of the source, that moves the plane of the source onto that of the
 /// target, exactly: a rotation about the normal, a translation in the plane. Elements of axes that

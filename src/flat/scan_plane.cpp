@@ -20,7 +20,7 @@ constexpr double kRoundingOfFiles = 2e-4;
 constexpr double kRoundingOfFloats = 4 * 1.2e-7;
 /// Points that a plane is fitted to and that the test for curves looks at; those around which that
 /// counts.
-constexpr std::size_t kSample = 50'000, kCurvePlaces = 128;
+constexpr std::size_t kPlaneSample = 50'000, kCurvePlaces = 128;
 /// Radius of the larger of two discs, in distances of neighbours and as a share of the extent; the
 /// other one is a fourth of it. A curve has four times as many points in the larger one, a filled
 /// plane sixteen times. It is wider than the noise of ranges, and narrower than a room.
@@ -52,7 +52,7 @@ bool read_point(const float* row, Point3& out) {
 /// Finite points, evenly chosen where there are many.
 std::vector<Point3> sample_of(const float* points, std::size_t size, std::size_t stride) {
   std::vector<Point3> out;
-  const std::size_t step = size / kSample + 1;
+  const std::size_t step = size / kPlaneSample + 1;
   Point3 p;
   for (std::size_t i = 0; i < size; i += step)
     if (read_point(points + i * stride, p)) out.push_back(p);

@@ -39,7 +39,7 @@ HEAVY = {
             f"data/{name}.hpp"
             for name in (
                 "ground_truth mesh scene_files surface rooms/house tours/trajectory"
-                " sensor/depth_sensor sensor/fusion sensor/rgbd"
+                " sensor/depth_sensor sensor/fusion sensor/planar_scanner sensor/rgbd"
             ).split()
         ),
     },

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Scans of a log of CARMEN (FLASER lines, poses corrected by a mapping program) as a folder for
-flat_scans.py: cloud_bin_<i>.ply in the frame of the scanner, poses.txt.
+run.py: cloud_bin_<i>.ply in the frame of the scanner, poses.txt.
 
 usage: carmen_scans.py LOG OUT [--every 1.5] [--scans 60] [--range 30]. Needs numpy."""
 

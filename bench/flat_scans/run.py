@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scans of 2-D scanners: recall, precision and calibration over all pairs of folders of scans.
 
-Generates buildings (`gpureg generate --scan-step`), some to fit the confidence, others to measure, and
-measures real scans, where FOLDERs are given: cloud_bin_<i>.ply and poses.txt (carmen_scans.py makes them of
-a log of CARMEN). A pair counts as overlapping where 30 % of the points of a scan have a point of the other
-one within 0.15 m under the true poses. A pose is correct where it moves the source by at most 0.2 m RMS
-(real scans: 0.3 m, as their poses are estimates).
+Generates buildings (`gpureg generate --scan-step`), and tests each by a fit of the confidence on the others; a
+pose is correct by Redwood's 0.2 m rule, and pairs that overlap by 30 % count. Then real scans, by the
+command's own confidence, where FOLDERs are given: cloud_bin_<i>.ply and poses.txt (carmen_scans.py makes them of a
+log of CARMEN). There a pair overlaps where 30 % of the points of a scan have a point of the other one within
+0.15 m, and a pose is correct where it moves the source by at most 0.3 m RMS, as the true poses are estimates.
 
-usage: flat_scans.py [FOLDER...] [--seeds 1 2 3] [--scans 16] [--work DIR] [-o FILE]
-       flat_scans.py --header src/confidence/confidence_model.hpp [--work DIR]    fits only
-Needs numpy; --header: what fit_confidence.py needs."""
+usage: run.py [FOLDER...] [--seeds 1 2 3] [--work DIR] [--header FILE] [-o FILE]
+--header: src/confidence/confidence_model.hpp gets a fit on all buildings. Needs what fit_confidence.py needs."""
 
 import functools
 import json
@@ -20,10 +19,12 @@ import sys
 import tempfile
 
 import numpy as np
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
 import record
 
 # name: building, seed, degrees between readings, field of view, range in metres, sigma in metres
-FIT = {
+BUILDINGS = {
     "house 11": ("", 11, 0.5, 360, 12, 0.01),
     "house 12": ("", 12, 0.25, 270, 30, 0.01),
     "house 13": ("", 13, 1.0, 360, 12, 0.02),
@@ -32,16 +33,8 @@ FIT = {
     "office 16": ("office", 16, 0.25, 270, 20, 0.01),
     "warehouse 17": ("warehouse", 17, 0.5, 360, 20, 0.01),
 }
-MEASURED = {
-    "house 21": ("", 21, 0.5, 360, 12, 0.01),
-    "house 22": ("", 22, 0.25, 270, 30, 0.01),
-    "house 23": ("", 23, 1.0, 360, 12, 0.02),
-    "office 24": ("office", 24, 0.5, 360, 12, 0.01),
-    "warehouse 25": ("warehouse", 25, 0.25, 270, 30, 0.01),
-}
 FRAMES = 200  # of a walk between scans: about 3 m
-NEAR, OVERLAP = 0.15, 0.3
-CORRECT, CORRECT_REAL = 0.2, 0.3  # metres
+NEAR, OVERLAP, CORRECT = 0.15, 0.3, 0.3  # metres, share, metres
 
 
 def read_ply(path):
@@ -96,7 +89,6 @@ def batch(arguments, folder, seed, result, *words):
 
 def results(arguments, folder, seed, *words):
     """All pairs of a folder, as rows: confidence, correct, overlapping, log odds of the confidence."""
-    limit = CORRECT_REAL if folder in arguments.folders else CORRECT
     scans, truth = truth_of(folder)
     with tempfile.TemporaryDirectory() as temporary:
         result = pathlib.Path(temporary) / "pairs.json"
@@ -110,7 +102,7 @@ def results(arguments, folder, seed, *words):
             found = np.array(pair["T_ij"]).reshape(4, 4)
             points = scans[pair["j"]]
             error = moved(found, points) - moved(i_from_j, points)
-            correct = np.sqrt((error**2).sum(1).mean()) <= limit
+            correct = np.sqrt((error**2).sum(1).mean()) <= CORRECT
         rows.append((pair["score"], correct, overlap >= OVERLAP, pair["ms"]["total"]))
     return rows
 
@@ -148,13 +140,32 @@ def figures(rows):
     }  # fmt: skip
 
 
-def fit(arguments, generated):
-    """Fits the regressions of 2-D scans to buildings, and prints figures of each by a fit on the others."""
+def left_out(run, model, regressions):
+    """Rows of a building by regressions that were not fitted to it."""
+    import fit_confidence
+
+    best, confidence, _ = fit_confidence.confidences(run, model, regressions)
+    rows = {pair: (0.0, False, overlap, 0.0) for pair, overlap in enumerate(run.in_truth)}
+    for mode, score in zip(best, confidence):
+        pair = run.pair[mode]
+        rows[pair] = (score, run.correct[mode], run.in_truth[pair], 0.0)
+    return list(rows.values())
+
+
+def generated_sets(arguments, work):
+    """Figures of every generated building by a fit on the others, all rows, the fits on all."""
     import fit_confidence
 
     every = {name: [] for name in fit_confidence.FLAT_MODELS}
-    for name, how in FIT.items():
-        folder = generated(name, *how)
+    for name, (building, seed, step, field, distance, noise) in BUILDINGS.items():
+        folder = work / name.replace(" ", "_")
+        if not (folder / "gt.log").exists():
+            words = ["--building", building] if building else []
+            record.gpureg(
+                arguments, "generate", folder, "--fragments", arguments.scans, "--seed", seed,
+                "--frames-per-fragment", FRAMES, "--scan-step", step, "--scan-field", field,
+                "--scan-range", distance, "--scan-noise", noise, "--quiet", *words,
+            )  # fmt: skip
         for model in every:
             result = folder / f"{model}.json"
             if result.exists():
@@ -167,55 +178,44 @@ def fit(arguments, generated):
                     shutil.copytree(folder, unknown, ignore=shutil.ignore_patterns("cameras.txt"))
                     batch(arguments, unknown, 1, result, "--viewpoint", "none")
             every[model].append(fit_confidence.Run(name, folder, result))
-    models = {}
-    for name, runs in every.items():
-        model = fit_confidence.FLAT_MODELS[name]
-        for run in runs:
-            others = [other for other in runs if other is not run]
-            found = fit_confidence.figures(run, model, fit_confidence.fit(others, [], model))
-            print(name, run.name, fit_confidence.text_of(found), flush=True)
-        models[name] = fit_confidence.fit(runs, [], model)
-    fit_confidence.write_header(arguments.header, models)
+    sets, all_rows = [], []
+    model = fit_confidence.FLAT_MODELS["flat"]
+    for run in every["flat"]:
+        others = [other for other in every["flat"] if other is not run]
+        rows = left_out(run, model, fit_confidence.fit(others, [], model))
+        sets.append({"set": run.building, "real": False, **figures(rows)})
+        print(json.dumps(sets[-1]), flush=True)
+        all_rows += rows
+    models = {
+        name: fit_confidence.fit(runs, [], fit_confidence.FLAT_MODELS[name])
+        for name, runs in every.items()
+    }
+    return sets, all_rows, models
 
 
 def main():
     parser = record.parser(__doc__, "flat_scans.json")
     parser.add_argument("folders", nargs="*", type=pathlib.Path)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--scans", type=int, default=16, help="of each building")
-    parser.add_argument("--voxel-size", default="auto")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of real scans")
+    parser.add_argument("--scans", type=int, default=24, help="of each building")
+    parser.add_argument("--voxel-size", default="0.1")
     parser.add_argument("--work", type=pathlib.Path, help="folder of the generated scans, kept")
-    parser.add_argument("--header", type=pathlib.Path)
+    parser.add_argument("--header", type=pathlib.Path, help="confidence_model.hpp to write")
     arguments = parser.parse_args()
     work = arguments.work or pathlib.Path(tempfile.mkdtemp())
-
-    def generated(name, building, seed, step, field, distance, noise):
-        folder = work / name.replace(" ", "_")
-        if not (folder / "gt.log").exists():
-            words = ["--building", building] if building else []
-            record.gpureg(
-                arguments, "generate", folder, "--fragments", arguments.scans, "--seed", seed,
-                "--frames-per-fragment", FRAMES, "--scan-step", step, "--scan-field", field,
-                "--scan-range", distance, "--scan-noise", noise, "--quiet", *words,
-            )  # fmt: skip
-        return folder
-
+    sets, rows, models = generated_sets(arguments, work)
     if arguments.header:
-        fit(arguments, generated)
-        return
-    folders = {name: generated(name, *how) for name, how in MEASURED.items()}
-    folders.update({folder.name: folder for folder in arguments.folders})
-    rows = {name: [] for name in folders}
-    real = [name for name, folder in folders.items() if folder in arguments.folders]
-    command = " ".join(["bench/accuracy/flat_scans.py", *real])
-    for k, seed in enumerate(arguments.seeds):
-        for name, folder in folders.items():
-            rows[name] += results(arguments, folder, seed)
-            print(seed, name, json.dumps(figures(rows[name])), flush=True)
-        sets = [{"set": name, "real": name in real, **figures(rows[name])} for name in rows]
-        every = [row for name in rows if name not in real for row in rows[name]]
-        content = {"seeds": arguments.seeds[: k + 1], "sets": sets, "generated": figures(every)}
-        record.write(arguments, command, content)
+        import fit_confidence
+
+        fit_confidence.write_header(arguments.header, models)
+    for folder in arguments.folders:
+        of = [row for seed in arguments.seeds for row in results(arguments, folder, seed)]
+        sets.append({"set": folder.name, "real": True, **figures(of)})
+        print(json.dumps(sets[-1]), flush=True)
+    command = ["bench/flat_scans/run.py", *(folder.name for folder in arguments.folders)]
+    command += ["--seeds", *map(str, arguments.seeds)]
+    content = {"seeds": arguments.seeds, "sets": sets, "generated": figures(rows)}
+    record.write(arguments, " ".join(command), content)
 
 
 if __name__ == "__main__":
