@@ -262,22 +262,21 @@ FIRST, SECOND = (-1.2, 0.8, 0.2), (-0.2, -1.0, 2.6)
 
 def test_pose_of_flat_scans_is_planar():
     source, target = flat_scan(*FIRST, 1), flat_scan(*SECOND, 2)
-    size = gpureg.suggest_voxel_size([source, target])
-    assert size.flat
-    result = gpureg.register(source, target, voxel_size=size.voxel_size)
+    assert gpureg.suggest_voxel_size([source, target]).flat
+    result = gpureg.register(source, target, voxel_size=0.1)
     assert result.aligned and result.flat
     truth = np.linalg.inv(flat_pose(*SECOND)) @ flat_pose(*FIRST)
     np.testing.assert_allclose(result.target_from_source, truth, atol=0.02)
     for mode in result.modes:
         assert mode.target_from_source[2].tolist() == [0, 0, 1, 0]
         assert mode.target_from_source[:2, 2].tolist() == [0, 0]
-    information = result.source_moments.information_open3d
+    information = result.source_moments.information_open3d()
     assert (information[np.ix_([2, 3, 4], [0, 1, 5])] == 0).all()
     assert pickle.loads(pickle.dumps(result)).flat
 
 
 def test_prepared_flat_scans_say_so():
-    cloud = gpureg.prepare(flat_scan(*FIRST, 1), voxel_size=0.1)
+    cloud = gpureg.prepare(flat_scan(*FIRST, 1))
     assert cloud.statistics.flat
     assert cloud.statistics.input_points == 1440
 
