@@ -160,9 +160,10 @@ std::optional<ScanPlane> find_scan_plane(const float* points, std::size_t size,
   }
   if (extent <= 0) return std::nullopt;
   const double slack = kRoundingOfFiles * extent + kRoundingOfFloats * largest;
+  const std::optional<ScanPlane> fitted = fitted_plane(sample, slack);
+  if (!fitted) return std::nullopt;
   std::optional<ScanPlane> plane = plane_of_axis(box, slack);
-  if (!plane) plane = fitted_plane(sample, slack);
-  if (!plane) return std::nullopt;
+  if (!plane) plane = fitted;
   const auto in_plane = [&](const Point3& p) { return height_over(*plane, p) <= slack; };
   if (!std::all_of(sample.begin(), sample.end(), in_plane)) return std::nullopt;
   Point3 p;

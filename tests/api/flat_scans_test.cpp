@@ -121,6 +121,8 @@ TEST(FlatScans, OtherCloudsAreNone) {
   for (int k = 0; k < 200; ++k)
     line.push_back(0.01f * static_cast<float>(k) * Eigen::Vector3f(1, 2, 3));
   EXPECT_FALSE(plane_of(line)) << "a line lies in many planes";
+  for (Eigen::Vector3f& p : line) p.z() = 0;
+  EXPECT_FALSE(plane_of(line)) << "a line without noise";
   std::mt19937 random(3);
   EXPECT_FALSE(plane_of(test::scan_room(random))) << "a room";
 }
