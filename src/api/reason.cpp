@@ -29,7 +29,7 @@ constexpr double kFreeMotion = 0.02;
 constexpr double kCloseInClutter = 0.5, kAgreeingInClutter = 0.3;
 /// Confidences of modes that compete, relative to the first one, and the sum from
 /// which they tell more than anything else.
-constexpr double kSimilarConfidence = 1.0 / 3.0, kTogether = 0.3;
+constexpr double kSimilarConfidence = 1.0 / 3.0, kAmbiguousTogether = 0.3;
 
 double higher(double a, double b) { return std::max(a, b); }
 double overlap_of(const PoseEvidence& e) { return higher(e.source_overlap, e.target_overlap); }
@@ -154,7 +154,8 @@ RegistrationReason diagnose(const RegistrationResult& result) {
   if (result.modes.empty() || s.inliers == 0) return RegistrationReason::no_candidate;
   const PoseEvidence& e = result.modes.front().evidence;
   const std::vector<double> similar = similar_confidences(result);
-  if (similar.size() > 1 && sum_of(similar) >= kTogether) return RegistrationReason::ambiguous;
+  if (similar.size() > 1 && sum_of(similar) >= kAmbiguousTogether)
+    return RegistrationReason::ambiguous;
   const double overlap = overlap_of(e);
   if (close_of(e) > kCloseInClutter && overlap < kAgreeingInClutter * close_of(e))
     return RegistrationReason::clutter;

@@ -23,14 +23,14 @@ constexpr std::array<Factor, 7> kFactors{{{3.28084, "feet and metres"},
                                           {304.8, "millimetres and feet"},
                                           {1000, "millimetres and metres"}}};
 /// Scans of one place differ in extent by about as much.
-constexpr double kTolerance = 1.2;
-constexpr std::size_t kSample = 100'000;
+constexpr double kUnitTolerance = 1.2;
+constexpr std::size_t kUnitSample = 100'000;
 
 /// Longest side of the box around the points, without the outermost hundredth each way: one stray
 /// point shall not decide.
 double extent_of(const PointCloudView& view) {
   std::array<std::vector<float>, 3> coordinates;
-  const std::size_t step = view.size / kSample + 1;
+  const std::size_t step = view.size / kUnitSample + 1;
   for (std::size_t k = 0; k < view.size; k += step) {
     const float* p = view.points + k * view.point_stride;
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
@@ -61,7 +61,7 @@ std::string question_units(const PointCloudView& source, const PointCloudView& t
   const double ratio = std::max(of_source / of_target, of_target / of_source);
   if (ratio < least_ratio) return "";
   const auto* const factor = std::find_if(kFactors.begin(), kFactors.end(), [&](const Factor& f) {
-    return ratio < kTolerance * f.ratio && f.ratio < kTolerance * ratio;
+    return ratio < kUnitTolerance * f.ratio && f.ratio < kUnitTolerance * ratio;
   });
   const bool usual = factor != kFactors.end();
   if (!usual && ratio < kSuspectRatio) return "";

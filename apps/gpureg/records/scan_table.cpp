@@ -9,7 +9,7 @@ namespace gpureg::cli {
 namespace {
 
 /// As RFC 4180 has it.
-std::string cell(const std::string& text) {
+std::string csv_cell(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string out = "\"";
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -21,7 +21,8 @@ std::string cell(const std::string& text) {
 void write_scan_table(const std::string& path, const std::vector<io::ScanFile>& scans) {
   std::string text = "number,name,file\n";
   for (const io::ScanFile& scan : scans)
-    text += std::to_string(scan.number) + "," + cell(scan.name) + "," + cell(scan.path) + "\n";
+    text +=
+        std::to_string(scan.number) + "," + csv_cell(scan.name) + "," + csv_cell(scan.path) + "\n";
   files::write_atomically(path, text);
 }
 

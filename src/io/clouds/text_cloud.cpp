@@ -24,9 +24,9 @@ constexpr std::size_t kMostColumns = 4096;
 
 constexpr char kBlanks = ' ';  ///< separator: any run of spaces and tabs
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_decimal(char c) { return c >= '0' && c <= '9'; }
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_blanks(std::string_view text) {
   const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
   text.remove_prefix(begin);
   return text.substr(0, text.find_last_not_of(" \t") + 1);
@@ -34,20 +34,20 @@ std::string_view trimmed(std::string_view text) {
 
 std::string_view without_quotes(std::string_view text) {
   if (text.size() > 1 && text.front() == '"' && text.back() == '"')
-    return trimmed(text.substr(1, text.size() - 2));
+    return without_blanks(text.substr(1, text.size() - 2));
   return text;
 }
 
 /// Cuts a line into at most so many fields.
 void cut(std::string_view line, char separator, std::size_t most, Fields& fields) {
   fields.clear();
-  line = trimmed(line);
+  line = without_blanks(line);
   while (!line.empty() && fields.size() < most) {
     const std::size_t end = std::min(
         separator == kBlanks ? line.find_first_of(" \t") : line.find(separator), line.size());
-    fields.push_back(without_quotes(trimmed(line.substr(0, end))));
+    fields.push_back(without_quotes(without_blanks(line.substr(0, end))));
     line.remove_prefix(std::min(end + 1, line.size()));
-    if (separator == kBlanks) line = trimmed(line);
+    if (separator == kBlanks) line = without_blanks(line);
   }
 }
 
@@ -55,22 +55,22 @@ char separator_of(std::string_view line, bool names) {
   if (line.find(';') != line.npos) return ';';
   if (line.find(',') != line.npos) return ',';
   // Names may have blanks in them.
-  return names && trimmed(line).find('\t') != line.npos ? '\t' : kBlanks;
+  return names && without_blanks(line).find('\t') != line.npos ? '\t' : kBlanks;
 }
 
 /// The text behind #, // or another mark of a comment; none: the line is no comment.
 std::optional<std::string_view> comment_of(std::string_view line) {
-  line = trimmed(line);
+  line = without_blanks(line);
   if (line.empty()) return std::nullopt;
   if (line.front() != '#' && line.front() != '%' && line.front() != '!' &&
       line.substr(0, 2) != "//")
     return std::nullopt;
-  return trimmed(line.substr(std::min(line.find_first_not_of("#%!/"), line.size())));
+  return without_blanks(line.substr(std::min(line.find_first_not_of("#%!/"), line.size())));
 }
 
 /// "Points:0", " X [m]" and "x" are x.
 std::string canonical(std::string_view name) {
-  std::string text(trimmed(name.substr(0, name.find_first_of("[("))));
+  std::string text(without_blanks(name.substr(0, name.find_first_of("[("))));
   for (char& c : text)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   if (text.size() > 2 && text[text.size() - 2] == ':' && text.back() >= '0' && text.back() <= '2') {
@@ -149,7 +149,8 @@ bool has_decimal_commas(std::string_view line) {
     ++numbers;
     const std::size_t comma = field.find(',');
     commas += comma != field.npos && comma == field.rfind(',') && comma > 0 &&
-              comma + 1 < field.size() && is_digit(field[comma - 1]) && is_digit(field[comma + 1]);
+              comma + 1 < field.size() && is_decimal(field[comma - 1]) &&
+              is_decimal(field[comma + 1]);
   }
   return numbers > 1 && 2 * commas >= numbers;
 }
@@ -162,7 +163,7 @@ class Reader {
   PointCloud read() {
     std::string_view line;
     while (source_.next_line(line)) {
-      if (trimmed(line).empty()) continue;
+      if (without_blanks(line).empty()) continue;
       if (const auto comment = comment_of(line)) {
         if (!columns_) take_names(*comment);
         continue;
@@ -194,7 +195,7 @@ class Reader {
   /// A line before the rows that is neither names nor numbers: a separator, as of spreadsheets, or
   /// the number of rows.
   bool is_preamble(std::string_view line) {
-    line = trimmed(line);
+    line = without_blanks(line);
     if (names_separator(line)) {
       separator_ = line[4];
       return true;
@@ -318,7 +319,7 @@ bool looks_like_text_cloud(std::string_view start) {
   Fields fields;
   while (source.next_line(line)) {
     const auto comment = comment_of(line);
-    const std::string_view text = comment ? *comment : trimmed(line);
+    const std::string_view text = comment ? *comment : without_blanks(line);
     std::size_t count = 0;
     if (text.empty() || names_separator(text) || parse_count(text, count)) continue;
     cut(text, separator_of(text, true), kMostColumns, fields);
