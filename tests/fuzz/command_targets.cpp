@@ -80,9 +80,13 @@ void read_initial_poses(std::string_view bytes) {
 /// Of a map: a trajectory, a log or a graph; those that are there are rigid.
 void read_poses(std::string_view bytes) {
   read(bytes, [](const std::string& path) {
-    const std::vector<int> numbers{0, 1, 2, 3, 5};
+    std::vector<io::ScanFile> scans;
+    for (const int number : {0, 1, 2, 3, 5}) {
+      const std::string name = "cloud_bin_" + std::to_string(number) + ".ply";
+      scans.push_back({number, name, name});
+    }
     std::size_t known = 0;
-    for (const auto& scan : cli::read_pose_file(path, numbers, "scans").scans) {
+    for (const auto& scan : cli::read_pose_file(path, scans, "scans").scans) {
       const Eigen::Matrix3d r = scan.island_from_scan.linear();
       if (!scan.placed) continue;
       ++known;
