@@ -21,6 +21,10 @@ constexpr double kRoundingOfFloats = 4 * 1.2e-7;
 /// Points that a plane is fitted to and that the test for curves looks at; those around which that
 /// counts.
 constexpr std::size_t kPlaneSample = 50'000, kCurvePlaces = 128;
+/// So many points tell almost every cloud that is not flat. They are farther from a plane of their
+/// own than from that of all points, by a factor that is below this one.
+constexpr std::size_t kFewPoints = 256;
+constexpr double kSlackOfFew = 4;
 /// Radius of the larger of two discs, in distances of neighbours and as a share of the extent; the
 /// other one is a fourth of it. A curve has four times as many points in the larger one, a filled
 /// plane sixteen times. It is wider than the noise of ranges, and narrower than a room.
@@ -49,10 +53,11 @@ bool read_point(const float* row, Point3& out) {
   return true;
 }
 
-/// Finite points, evenly chosen where there are many.
-std::vector<Point3> sample_of(const float* points, std::size_t size, std::size_t stride) {
+/// Finite points, evenly chosen if there are more.
+std::vector<Point3> sample_of(const float* points, std::size_t size, std::size_t stride,
+                              std::size_t most) {
   std::vector<Point3> out;
-  const std::size_t step = size / kPlaneSample + 1;
+  const std::size_t step = size / most + 1;
   Point3 p;
   for (std::size_t i = 0; i < size; i += step)
     if (read_point(points + i * stride, p)) out.push_back(p);
@@ -63,6 +68,23 @@ std::vector<Point3> sample_of(const float* points, std::size_t size, std::size_t
 struct Extent {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   double size() const { return high - low; }
+};
+
+struct Box {
+  Extent sides[3];
+  double extent = 0, largest = 0;  ///< longest side; largest coordinate
+  explicit Box(const std::vector<Point3>& points) {
+    for (const Point3& p : points)
+      for (int k = 0; k < 3; ++k) {
+        sides[k].low = std::min(sides[k].low, p.at[k]);
+        sides[k].high = std::max(sides[k].high, p.at[k]);
+      }
+    for (const Extent& side : sides) {
+      extent = std::max(extent, side.size());
+      largest = std::max({largest, std::abs(side.low), std::abs(side.high)});
+    }
+  }
+  double slack() const { return kRoundingOfFiles * extent + kRoundingOfFloats * largest; }
 };
 
 /// A scan that is parallel to two axes, the usual one, has exactly the third one as its normal.
@@ -112,6 +134,14 @@ double height_over(const ScanPlane& plane, const Point3& p) {
   return std::abs(height);
 }
 
+bool may_be_flat(const std::vector<Point3>& few) {
+  if (few.size() < 4) return true;
+  const double slack = kSlackOfFew * Box(few).slack();
+  const std::optional<ScanPlane> plane = fitted_plane(few, 0);
+  return !plane || std::all_of(few.begin(), few.end(),
+                               [&](const Point3& p) { return height_over(*plane, p) <= slack; });
+}
+
 /// Whether points in a plane form curves, by the number of them in discs of two sizes.
 bool are_curves(const std::vector<Point3>& points, double extent) {
   const std::size_t places = std::min(kCurvePlaces, points.size());
@@ -145,31 +175,22 @@ bool are_curves(const std::vector<Point3>& points, double extent) {
 
 std::optional<ScanPlane> find_scan_plane(const float* points, std::size_t size,
                                          std::size_t stride) {
-  const std::vector<Point3> sample = sample_of(points, size, stride);
+  if (!may_be_flat(sample_of(points, size, stride, kFewPoints))) return std::nullopt;
+  const std::vector<Point3> sample = sample_of(points, size, stride, kPlaneSample);
   if (sample.size() < kFewestReturns) return std::nullopt;
-  Extent box[3];
-  double extent = 0, largest = 0;
-  for (const Point3& p : sample)
-    for (int k = 0; k < 3; ++k) {
-      box[k].low = std::min(box[k].low, p.at[k]);
-      box[k].high = std::max(box[k].high, p.at[k]);
-    }
-  for (const Extent& side : box) {
-    extent = std::max(extent, side.size());
-    largest = std::max({largest, std::abs(side.low), std::abs(side.high)});
-  }
-  if (extent <= 0) return std::nullopt;
-  const double slack = kRoundingOfFiles * extent + kRoundingOfFloats * largest;
+  const Box box(sample);
+  if (box.extent <= 0) return std::nullopt;
+  const double slack = box.slack();
   const std::optional<ScanPlane> fitted = fitted_plane(sample, slack);
   if (!fitted) return std::nullopt;
-  std::optional<ScanPlane> plane = plane_of_axis(box, slack);
+  std::optional<ScanPlane> plane = plane_of_axis(box.sides, slack);
   if (!plane) plane = fitted;
   const auto in_plane = [&](const Point3& p) { return height_over(*plane, p) <= slack; };
   if (!std::all_of(sample.begin(), sample.end(), in_plane)) return std::nullopt;
   Point3 p;
   for (std::size_t i = 0; i < size; ++i)
     if (read_point(points + i * stride, p) && !in_plane(p)) return std::nullopt;
-  if (!are_curves(sample, extent)) return std::nullopt;
+  if (!are_curves(sample, box.extent)) return std::nullopt;
   return plane;
 }
 

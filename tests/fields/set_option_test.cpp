@@ -33,9 +33,9 @@ TEST(SetOption, WhatDoesNotFitIsNamed) {
                                         {std::string("--set ") + text + ": " + why});
   };
   refuse("evidence.sample", "expected NAME=VALUE");
-  refuse("evidence.sampel=3", "there is no such option, only sample, modes");
+  refuse("evidence.sampel=3", "there is no such option (did you mean sample?), only sample, modes");
   refuse("evidence=3", "there is no such option, only sample, modes");
-  refuse("seed.x=3", "there is no such option, only seed, min_confidence");
+  refuse("seed.x=3", "there is no such option (did you mean seed?), only seed, min_confidence");
   refuse("=3", "there is no such option");
   refuse("evidence.sample=-1", "expected a whole number from 0 to 4294967295");
   refuse("evidence.sample=4294967296", "expected a whole number from 0 to 4294967295");

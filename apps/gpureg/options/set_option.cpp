@@ -76,7 +76,7 @@ void assign(T& options, Assignment& a) {
   std::string list;
   for (const std::string& field : names) list += (list.empty() ? "" : ", ") + field;
   const std::string meant = nearest(name, names);
-  a.refuse("there is no such option" + (meant.empty() ? "" : ", did you mean " + meant + "?") +
+  a.refuse("there is no such option" + (meant.empty() ? "" : " (did you mean " + meant + "?)") +
            ", only " + list);
 }
 
