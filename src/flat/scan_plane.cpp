@@ -23,7 +23,7 @@ constexpr double kRoundingOfFloats = 4 * 1.2e-7;
 constexpr std::size_t kPlaneSample = 50'000, kCurvePlaces = 128;
 /// So many points tell almost every cloud that is not flat. They are farther from a plane of their
 /// own than from that of all points, by a factor that is below this one.
-constexpr std::size_t kFewPoints = 256;
+constexpr std::size_t kFirstLook = 256;
 constexpr double kSlackOfFew = 4;
 /// Radius of the larger of two discs, in distances of neighbours and as a share of the extent; the
 /// other one is a fourth of it. A curve has four times as many points in the larger one, a filled
@@ -70,10 +70,10 @@ struct Extent {
   double size() const { return high - low; }
 };
 
-struct Box {
+struct PlaneBox {
   Extent sides[3];
   double extent = 0, largest = 0;  ///< longest side; largest coordinate
-  explicit Box(const std::vector<Point3>& points) {
+  explicit PlaneBox(const std::vector<Point3>& points) {
     for (const Point3& p : points)
       for (int k = 0; k < 3; ++k) {
         sides[k].low = std::min(sides[k].low, p.at[k]);
@@ -136,7 +136,7 @@ double height_over(const ScanPlane& plane, const Point3& p) {
 
 bool may_be_flat(const std::vector<Point3>& few) {
   if (few.size() < 4) return true;
-  const double slack = kSlackOfFew * Box(few).slack();
+  const double slack = kSlackOfFew * PlaneBox(few).slack();
   const std::optional<ScanPlane> plane = fitted_plane(few, 0);
   return !plane || std::all_of(few.begin(), few.end(),
                                [&](const Point3& p) { return height_over(*plane, p) <= slack; });
@@ -175,10 +175,10 @@ bool are_curves(const std::vector<Point3>& points, double extent) {
 
 std::optional<ScanPlane> find_scan_plane(const float* points, std::size_t size,
                                          std::size_t stride) {
-  if (!may_be_flat(sample_of(points, size, stride, kFewPoints))) return std::nullopt;
+  if (!may_be_flat(sample_of(points, size, stride, kFirstLook))) return std::nullopt;
   const std::vector<Point3> sample = sample_of(points, size, stride, kPlaneSample);
   if (sample.size() < kFewestReturns) return std::nullopt;
-  const Box box(sample);
+  const PlaneBox box(sample);
   if (box.extent <= 0) return std::nullopt;
   const double slack = box.slack();
   const std::optional<ScanPlane> fitted = fitted_plane(sample, slack);

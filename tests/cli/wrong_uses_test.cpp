@@ -175,7 +175,7 @@ INSTANTIATE_TEST_SUITE_P(
             2,
             {"--voxel-size: '5cm', expected FLOAT or auto"}},
         // Files.
-        Use{"NoCloud", align("a.ply", "text.txt"), 2, {"text.txt", "neither"}},
+        Use{"NoCloud", align("a.ply", "text.txt"), 2, {"text.txt", "expected a row of x y z"}},
         Use{"NoFile", align("a.ply", "b.pyl"), 2, {"TARGET: cannot read", "No such file"}},
         Use{"AFolder", align("a.ply", "scans"), 2, {"scans", "folder"}},
         Use{"HalfOfADownload", align("a.ply", "half.ply"), 2, {"half.ply", "truncated", "only"}},

@@ -198,7 +198,7 @@ TEST_F(CalibrateVerb, PromisesARiskForFurtherScenes) {
   refused({self}, {folder_.path(), "other_0.json", "9 clouds in common"});
   json other = scene(1);
   other["options"]["prepare"]["voxel_size"] = 0.2;
-  refused({other}, {"other_0.json", "another prepare.voxel_size"});
+  refused({other}, {"other_0.json", "another --voxel-size"});
   other = scene(1);
   other["options"]["evidence"].erase("sample");
   refused({other}, {"another evidence.sample"});
