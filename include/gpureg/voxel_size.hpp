@@ -62,7 +62,8 @@ constexpr double kLeastUnitRatio = 2.5;
 
 /// Asks whether two clouds have different units, if the ratio of their extents is that of usual
 /// units (within 20 %) or above kSuspectRatio. Stray points do not matter. Thread-safe.
-/// @param views host memory.
+/// @param source host memory.
+/// @param target host memory.
 /// @param least_ratio no question below.
 /// @return "are the units different? target is 1045 times larger than source, as with millimetres
 ///   and metres"; empty: nothing suspect.
