@@ -83,7 +83,7 @@ def from_depth_image(
     fx, fy, cx, cy : float
         Intrinsics in pixels; (cx, cy) is the principal point, and (0, 0) the centre of the first pixel.
     depth_scale : float
-        Units of `depth` in a metre: 1000 of millimetres, 5000 in the data set of TUM, 1 of metres.
+        Units of the image in a metre: 1000 of millimetres, 5000 in the data set of TUM, 1 of metres.
 
     Examples
     --------
