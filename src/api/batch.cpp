@@ -5,6 +5,7 @@
 #include <atomic>
 #include <utility>
 
+#include "api/engine_calls.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "common/host_threads.hpp"
@@ -79,7 +80,9 @@ std::vector<RegistrationResult> Batch::run() {
     StopScope::poll();
     Chunk now = next_chunk();
     if (now.size() == 0) break;
-    const auto align = [&] { align_all(engine_, now.inputs, options_, now.outcomes); };
+    const auto align = [&] {
+      align_all(engine_, span_of(now.inputs), options_, {now.outcomes.data(), now.outcomes.size()});
+    };
     if (overlap && before.size() > 0) {
       // Callbacks stay in the thread of the caller.
       on_threads(2, [&](std::size_t part) { part == 0 ? conclude(before) : align(); });

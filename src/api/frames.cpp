@@ -40,11 +40,10 @@ UnalignedIsometry3d to_transform(const Pose<double>& pose, const PreparedState& 
   return swapped ? fixed_from_moved.inverse() : fixed_from_moved;
 }
 
-Pose<double> to_local(const UnalignedIsometry3d& target_from_source, const PreparedState& source,
-                      const PreparedState& target, bool swapped) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = target_from_source.linear();
-  pose.translation() = target_from_source * offset_of(source) - offset_of(target);
+Pose<double> to_local_of_rows(const UnalignedIsometry3d& target_from_source,
+                              const PreparedState& source, const PreparedState& target,
+                              bool swapped) {
+  Eigen::Isometry3d pose(target_from_source.matrix());
   if (swapped) pose = pose.inverse();
   const PreparedState& moved = swapped ? target : source;
   const PreparedState& fixed = swapped ? source : target;
@@ -52,6 +51,13 @@ Pose<double> to_local(const UnalignedIsometry3d& target_from_source, const Prepa
       pose.translation() + pose.linear() * origin_of(moved) - origin_of(fixed);
   const Eigen::Quaterniond q = Eigen::Quaterniond(pose.linear()).normalized();
   return {q.w(), q.x(), q.y(), q.z(), shift.x(), shift.y(), shift.z()};
+}
+
+Pose<double> to_local(const UnalignedIsometry3d& target_from_source, const PreparedState& source,
+                      const PreparedState& target, bool swapped) {
+  UnalignedIsometry3d of_rows = target_from_source;
+  of_rows.translation() = target_from_source * offset_of(source) - offset_of(target);
+  return to_local_of_rows(of_rows, source, target, swapped);
 }
 
 void move_to_frame(UnalignedIsometry3d& target_from_source, const PreparedState& source,

@@ -41,7 +41,10 @@ CorrespondenceMoments to_frame(const Moments& moments, const PreparedState& clou
 UnalignedIsometry3d to_transform(const Pose<double>& pose, const PreparedState& source,
                                  const PreparedState& target, bool swapped);
 
-/// The other way round, of target_from_source between the clouds' frames.
+/// The other way round, and of target_from_source between the clouds' frames.
+Pose<double> to_local_of_rows(const UnalignedIsometry3d& target_from_source,
+                              const PreparedState& source, const PreparedState& target,
+                              bool swapped);
 Pose<double> to_local(const UnalignedIsometry3d& target_from_source, const PreparedState& source,
                       const PreparedState& target, bool swapped);
 

@@ -187,8 +187,8 @@ void add_modes(const PairOutcome& outcome, const AlignedPair& pair, Registration
 
 RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair,
                                  const PriorTest& prior) {
-  // Refinement moves poses, so they are asked again. It may also move a 2-D scan out of its plane,
-  // where nothing overlaps and nothing speaks against the pose.
+  // Refinement moves poses, so they are asked again. Nothing speaks against a 2-D scan that it
+  // moved to where nothing overlaps.
   const auto forbidden = [&](const ModeOutcome& m) {
     return !permitted(prior, to_rigid(m.pose)) || (pair.flat() && confidence::without_overlap(m));
   };

@@ -2,7 +2,6 @@
 #include "api/pair_input.hpp"
 
 #include "api/prior.hpp"
-#include "common/in_halves.hpp"
 #include "common/shown.hpp"
 
 namespace gpureg {
@@ -62,16 +61,6 @@ PairInput input_of(const PreparedState& source, const PreparedState& target, boo
       swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
   out.prior = prior_test(prior, source, target, swapped);
   return out;
-}
-
-void align_all(Engine& engine, const std::vector<PairInput>& pairs,
-               const RegistrationOptions& options, std::vector<PairOutcome>& outcomes) {
-  in_halves(0, pairs.size(), [&](std::size_t begin, std::size_t end) {
-    // A larger part that failed may have left some of its outcomes.
-    for (std::size_t p = begin; p < end; ++p) outcomes[p] = PairOutcome();
-    engine.align({pairs.data() + begin, end - begin}, options,
-                 {outcomes.data() + begin, end - begin});
-  });
 }
 
 }  // namespace gpureg

@@ -29,8 +29,4 @@ bool swaps(const PreparedState& source, const PreparedState& target,
 PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped,
                    const RegistrationPrior& prior = {});
 
-/// Aligns all pairs, together as far as limits and memory allow.
-void align_all(Engine& engine, const std::vector<PairInput>& pairs,
-               const RegistrationOptions& options, std::vector<PairOutcome>& outcomes);
-
 }  // namespace gpureg

@@ -7,6 +7,7 @@
 
 #include "api/access.hpp"
 #include "api/batch.hpp"
+#include "api/engine_calls.hpp"
 #include "api/name_cloud.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
@@ -188,7 +189,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
       outcome.statistics.target_points = input.target->size;
       outcome.reason = RegistrationReason::no_usable_features;
     } else {
-      Access::engine(context)->align({&input, 1}, options, {&outcome, 1});
+      align_all(*Access::engine(context), {&input, 1}, options, {&outcome, 1});
     }
     keep_better(to_result(outcome, {*variant.source, *variant.target, swapped, options}), result);
   }

@@ -4,21 +4,17 @@
 #include <algorithm>
 #include <string>
 
+#include "api/engine_calls.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/variants.hpp"
 #include "api/verify_by_surfaces.hpp"
-#include "common/in_halves.hpp"
 #include "common/rigid.hpp"
 #include "common/stop_scope.hpp"
 #include "confidence/calibrate_modes.hpp"
 
 namespace gpureg {
 namespace {
-
-/// Poses of a pair that go through the engine together: enough to fill a device, few enough for its
-/// memory.
-constexpr std::size_t kPosesPerCall = 64;
 
 /// One pair whose poses are verified.
 struct VerifiedPair : AlignedPair {
@@ -87,39 +83,6 @@ void keep_more_confident(std::vector<PoseVerification>&& candidate,
     return confidence;
   };
   if (most(candidate) > most(kept)) kept = std::move(candidate);
-}
-
-/// Outcomes of a pair's poses, as many calls as they need.
-std::vector<PairOutcome> verify_all(Engine& engine, const std::vector<PairInput>& inputs,
-                                    const std::vector<std::vector<Pose<double>>>& poses,
-                                    const RegistrationOptions& options, bool refine) {
-  std::vector<PairOutcome> out(inputs.size());
-  std::size_t most = 0;
-  for (const auto& of_pair : poses) most = std::max(most, of_pair.size());
-  for (std::size_t begin = 0; begin < most; begin += kPosesPerCall) {
-    std::vector<PosesOfPair> part(inputs.size());
-    for (std::size_t p = 0; p < inputs.size(); ++p) {
-      const std::size_t first = std::min(begin, poses[p].size()),
-                        last = std::min(begin + kPosesPerCall, poses[p].size());
-      part[p].poses.assign(poses[p].begin() + static_cast<std::ptrdiff_t>(first),
-                           poses[p].begin() + static_cast<std::ptrdiff_t>(last));
-    }
-    std::vector<PairOutcome> more(inputs.size());
-    in_halves(0, inputs.size(), [&](std::size_t first, std::size_t last) {
-      for (std::size_t p = first; p < last; ++p) more[p] = PairOutcome();
-      engine.verify({inputs.data() + first, last - first},
-                    {part.begin() + static_cast<std::ptrdiff_t>(first),
-                     part.begin() + static_cast<std::ptrdiff_t>(last)},
-                    options, refine, {more.data() + first, last - first});
-    });
-    for (std::size_t p = 0; p < inputs.size(); ++p) {
-      std::vector<ModeOutcome> modes = std::move(out[p].modes);
-      modes.insert(modes.end(), more[p].modes.begin(), more[p].modes.end());
-      out[p] = std::move(more[p]);
-      out[p].modes = std::move(modes);
-    }
-  }
-  return out;
 }
 
 /// The poses of one pair with their evidence, between the rows of the clouds.
@@ -226,7 +189,8 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
                           const std::vector<PairOutcome>& outcomes, Verifications& made) {
                         std::vector<PairOutcome> found(inputs.size());
                         if (verification.search_alternatives)
-                          align_all(engine, inputs, verified.front().options, found);
+                          align_all(engine, span_of(inputs), verified.front().options,
+                                    {found.data(), found.size()});
                         for (std::size_t v = 0; v < made.size(); ++v)
                           set_confidences(verified[v], outcomes[v],
                                           verification.search_alternatives ? &found[v] : nullptr,

@@ -7,6 +7,7 @@
 
 #include "flat/scan_plane.hpp"
 #include "gpureg/registration.hpp"
+#include "gpureg/verification.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "support/floor_plan.hpp"
 #include "support/scan.hpp"
@@ -151,6 +152,36 @@ TEST(FlatScans, AreRegisteredInTheirPlane) {
   EXPECT_LT(result.source_moments.count, first_scan().size());
   for (const int in : {2, 3, 4})
     for (const int out : {0, 1, 5}) EXPECT_EQ(information(in, out), 0);
+}
+
+TEST(FlatScans, TheEvidenceIsThatOfThePlanarPose) {
+  const Context context = Context::cpu(2);
+  // The layers let these drift out of their plane, each at its own voxel size.
+  for (const float voxel : {0.05f, 0.08f, 0.12f, 0.15f}) {
+    RegistrationOptions options = RegistrationOptions::from_voxel_size(voxel);
+    options.min_confidence = 0;
+    const auto source = prepare(context, PointCloudView(first_scan()), options.prepare),
+               target = prepare(context, PointCloudView(second_scan()), options.prepare);
+    const RegistrationResult found = align(context, source, target, options);
+    ASSERT_EQ(found.reason, RegistrationReason::none);
+    std::vector<UnalignedIsometry3d> poses;
+    for (const RegistrationMode& mode : found.modes) poses.push_back(mode.target_from_source);
+    const std::vector<PoseVerification> as_they_are =
+        verify_poses(context, source, target, poses, options, {false, false});
+    ASSERT_EQ(as_they_are.size(), found.modes.size());
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      const PoseEvidence &a = found.modes[k].evidence, &b = as_they_are[k].evidence;
+      EXPECT_NEAR(a.source_overlap, b.source_overlap, 0.01) << voxel << " " << k;
+      EXPECT_NEAR(a.target_overlap, b.target_overlap, 0.01) << voxel << " " << k;
+    }
+    // A pose that is refined stays in the plane, with its evidence.
+    VerificationOptions refine;
+    refine.refine = true;
+    const PoseVerification refined =
+        verify_poses(context, source, target, {poses.front()}, options, refine).front();
+    EXPECT_EQ(refined.target_from_source(2, 3), 0);
+    EXPECT_NEAR(refined.inlier_ratio, found.inlier_ratio, 0.02) << voxel;
+  }
 }
 
 TEST(FlatScans, TheSmallerCloudMayBeTheTarget) {

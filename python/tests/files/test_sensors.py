@@ -260,11 +260,13 @@ def flat_pose(x, y, turn):
 FIRST, SECOND = (-1.2, 0.8, 0.2), (-0.2, -1.0, 2.6)
 
 
-def test_pose_of_flat_scans_is_planar():
+@pytest.mark.parametrize("voxel_size", [0.1, "auto"])
+def test_pose_of_flat_scans_is_planar(voxel_size):
     source, target = flat_scan(*FIRST, 1), flat_scan(*SECOND, 2)
     assert gpureg.suggest_voxel_size([source, target]).flat
-    result = gpureg.register(source, target, voxel_size=0.1)
+    result = gpureg.register(source, target, voxel_size=voxel_size)
     assert result.aligned and result.flat
+    assert result.inlier_ratio > 0.7
     truth = np.linalg.inv(flat_pose(*SECOND)) @ flat_pose(*FIRST)
     np.testing.assert_allclose(result.target_from_source, truth, atol=0.02)
     for mode in result.modes:
