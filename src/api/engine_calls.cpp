@@ -17,9 +17,10 @@ using Poses = std::vector<Pose<double>>;
 /// memory.
 constexpr std::size_t kPosesPerCall = 64;
 
-/// The layers of a 2-D scan hold a pose in the plane only weakly while it is refined. The projected
-/// pose has to settle again, by so few iterations that it stays near the plane.
-constexpr std::uint32_t kPlanarIterations = 6;
+/// The layers of a 2-D scan hold a pose in the plane only weakly while it is refined, and a pose
+/// that has left it is projected to a worse one. So the projected pose is refined again, by so few
+/// iterations that it stays near the plane, and projected after them.
+constexpr std::uint32_t kPlanarRounds = 2, kPlanarIterations = 2;
 
 /// The modes of all pairs are those of the poses, in their order.
 std::vector<PairOutcome> verify_in_parts(Engine& engine, const std::vector<PairInput>& pairs,
@@ -94,7 +95,7 @@ void keep_in_plane(Engine& engine, Span<const PairInput> all, const Registration
   const std::uint32_t first = 0;  // a match, so that none are searched; their evidence is not used
   std::vector<PairInput> unmatched = pairs;
   for (PairInput& pair : unmatched) pair.custom_source = pair.custom_target = {&first, 1};
-  if (few.refine.max_iterations > 0) {
+  for (std::uint32_t round = 0; round < kPlanarRounds && few.refine.max_iterations > 0; ++round) {
     const std::vector<PairOutcome> refined = verify_in_parts(engine, unmatched, poses, few, true);
     for (std::size_t p = 0; p < pairs.size(); ++p) {
       poses[p] = planar_poses(refined[p], pairs[p]);
