@@ -2,6 +2,7 @@
 // Scans of 2-D scanners: recognised, registered in their plane.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -230,6 +231,26 @@ TEST(FlatScans, CountsAreOfTheScan) {
   EXPECT_TRUE(cloud.statistics().flat);
   EXPECT_EQ(cloud.statistics().input_points, scan.size());
   EXPECT_EQ(cloud.statistics().invalid_points, 1u);
+}
+
+TEST(FlatScans, OfAnotherPlaceAreUnlikelyWithoutAThreshold) {
+  Points circle;
+  for (int k = 0; k < 720; ++k) {
+    const float angle = static_cast<float>(k) * 0.0087266f;
+    circle.emplace_back(3 * std::cos(angle),
+                        3 * std::sin(angle) + 0.001f * static_cast<float>(k % 7), 0.0f);
+  }
+  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
+  options.min_confidence = 0;
+  const RegistrationResult result =
+      align(Context::cpu(2), PointCloudView(first_scan()), PointCloudView(circle), options);
+  EXPECT_TRUE(result.flat);
+  EXPECT_LT(result.score, 0.2);
+  EXPECT_EQ(result.aligned(), result.has_candidate);
+  if (result.has_candidate) {
+    EXPECT_GT(result.statistics.inliers, 0u);
+    EXPECT_EQ(result.target_from_source(2, 3), 0);
+  }
 }
 
 TEST(FlatScans, WithA3dCloudIsRefused) {
