@@ -12,13 +12,13 @@
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/raw_cloud.hpp"
-#include "api/stray_points.hpp"
 #include "api/variants.hpp"
 #include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
 #include "flat/extruded.hpp"
+#include "spacing/stray_points.hpp"
 #include "viewpoint/unknown_viewpoint.hpp"
 
 namespace gpureg {

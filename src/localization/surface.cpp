@@ -5,12 +5,12 @@
 #include <cmath>
 
 #include "api/raw_cloud.hpp"
-#include "api/stray_points.hpp"
 #include "common/coordinates.hpp"
 #include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "common/whole.hpp"
 #include "common/without_features.hpp"
+#include "spacing/stray_points.hpp"
 
 namespace gpureg::localization {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "api/stray_points.hpp"
+#include "spacing/stray_points.hpp"
 
 #include <algorithm>
 #include <cmath>
