@@ -11,8 +11,9 @@
 namespace gpureg {
 namespace {
 
-/// Points of the smallest scan; fewer do not show whether they form curves.
-constexpr std::size_t kFewestReturns = 50;
+/// Points of the smallest scan. Scanners give 180 and more; a hundred random points of a wall can
+/// look like curves.
+constexpr std::size_t kFewestReturns = 120;
 /// Distance of a point from the plane, as a share of the largest extent: files round coordinates to
 /// millimetres, which a tilted plane turns into as much; the noise of a 3-D sensor is larger.
 constexpr double kRoundingOfFiles = 2e-4;
