@@ -102,7 +102,7 @@ def test_own_features():
 def snippets():
     """The Python programs of the README, as printed."""
     text = (pathlib.Path(__file__).parents[2] / "README.md").read_text()
-    assert "pip install '.[batch]'" in text
+    assert "pip install '.[batch,formats]'" in text
     return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
