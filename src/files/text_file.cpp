@@ -94,7 +94,7 @@ std::string read_start(const std::string& path, std::size_t bytes) {
   return content;
 }
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   constexpr std::size_t longest = 40;
   std::string out = "'";
   for (const char c : text.substr(0, longest)) out += (c >= ' ' && c <= '~') ? c : '?';
@@ -130,16 +130,16 @@ bool TextFile::next() {
 double TextFile::number(std::size_t k, const char* what) const {
   double value = 0;
   if (!parse(fields_.at(k), value))
-    fail(std::string(what) + " is " + quoted(fields_[k]) + ", expected a number");
+    fail(std::string(what) + " is " + in_quotes(fields_[k]) + ", expected a number");
   if (!std::isfinite(value))
-    fail(std::string(what) + " is " + quoted(fields_[k]) + ", expected a finite number");
+    fail(std::string(what) + " is " + in_quotes(fields_[k]) + ", expected a finite number");
   return value;
 }
 
 int TextFile::index(std::size_t k, const char* what) const {
   int value = 0;
   if (!parse(fields_.at(k), value) || value < 0)
-    fail(std::string(what) + " is " + quoted(fields_[k]) +
+    fail(std::string(what) + " is " + in_quotes(fields_[k]) +
          ", expected an integer from 0 to 2147483647");
   return value;
 }

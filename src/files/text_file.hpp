@@ -23,7 +23,7 @@ std::string read_file(const std::string& path, std::size_t max_bytes = kMaxTextB
 std::string read_start(const std::string& path, std::size_t bytes);
 
 /// text for an error message: shortened, and without bytes that a terminal would act upon.
-std::string quoted(std::string_view text);
+std::string in_quotes(std::string_view text);
 
 /// The lines of a text file that are not blank, each cut into fields at spaces, tabs and carriage
 /// returns.

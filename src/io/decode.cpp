@@ -195,7 +195,7 @@ PointCloud decode_text(const Table& table, Source& source,
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::string_view text = fields[first_value[columns[axis]]];
       if (!parse_coordinate(text, row[static_cast<Eigen::Index>(axis)]))
-        source.fail_line(table.columns[columns[axis]].name + " is " + files::quoted(text) +
+        source.fail_line(table.columns[columns[axis]].name + " is " + files::in_quotes(text) +
                          ", expected a number");
     }
     return row;

@@ -14,7 +14,7 @@ std::pair<int, int> numbers(const files::TextFile& file) {
 
 [[noreturn]] void fail(const files::TextFile& file, std::string_view word) {
   file.fail(scans::is_digits(word) ? "there is no fragment " + std::string(word)
-                                   : "there is no scan named " + files::quoted(word));
+                                   : "there is no scan named " + files::in_quotes(word));
 }
 
 /// The only place where a line falls into the words of two scans: names may have blanks.
@@ -34,7 +34,7 @@ std::pair<int, int> pair_of(const files::TextFile& file, const std::vector<ScanF
     fail(file, file.fields()[first ? 0 : 1]);
   }
   if (count < 2) numbers(file);
-  file.fail(files::quoted(scans::words(file, 0, count)) +
+  file.fail(files::in_quotes(scans::words(file, 0, count)) +
             " names no two scans, expected two names or numbers");
 }
 

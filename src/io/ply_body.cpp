@@ -105,7 +105,7 @@ void read_text_faces(const PlyElement& element, Source& source, Polygons& faces)
       for (std::size_t k = 0; lists_corners(property) && k < count; ++k) {
         double vertex = 0;
         if (!parse_coordinate(fields[at + k], vertex))
-          source.fail_line("a vertex of a face is " + files::quoted(fields[at + k]) +
+          source.fail_line("a vertex of a face is " + files::in_quotes(fields[at + k]) +
                            ", expected a number");
         faces.add_corner(vertex, source);
       }

@@ -9,7 +9,7 @@ namespace gpureg::io {
 namespace {
 
 using Fields = std::vector<std::string_view>;
-using files::quoted;
+using files::in_quotes;
 
 Scalar scalar_type(std::string_view name, const Source& source) {
   static constexpr std::pair<std::string_view, Scalar> known[] = {
@@ -21,7 +21,7 @@ Scalar scalar_type(std::string_view name, const Source& source) {
       {"double", Scalar::float64}, {"float64", Scalar::float64}};
   for (const auto& [text, type] : known)
     if (text == name) return type;
-  source.fail_line("unknown type " + quoted(name));
+  source.fail_line("unknown type " + in_quotes(name));
 }
 
 PlyFormat format_of(const Fields& fields, const Source& source) {
@@ -29,14 +29,14 @@ PlyFormat format_of(const Fields& fields, const Source& source) {
   if (fields[1] == "ascii") return PlyFormat::ascii;
   if (fields[1] == "binary_little_endian") return PlyFormat::binary_little_endian;
   if (fields[1] == "binary_big_endian") return PlyFormat::binary_big_endian;
-  source.fail_line("unknown format " + quoted(fields[1]));
+  source.fail_line("unknown format " + in_quotes(fields[1]));
 }
 
 PlyElement element_of(const Fields& fields, const Source& source) {
   PlyElement element;
   if (fields.size() != 3) source.fail_line("expected: element <name> <count>");
   if (!parse_count(fields[2], element.count))
-    source.fail_line("the count of an element is " + quoted(fields[2]) + ", expected a number");
+    source.fail_line("the count of an element is " + in_quotes(fields[2]) + ", expected a number");
   element.name = std::string(fields[1]);
   return element;
 }
@@ -46,7 +46,7 @@ PlyProperty property_of(const Fields& fields, const Source& source) {
   if (fields.size() == 5 && fields[1] == "list") {
     property.list_count = scalar_type(fields[2], source);
     if (*property.list_count == Scalar::float32 || *property.list_count == Scalar::float64)
-      source.fail_line("the count of a list cannot be a " + quoted(fields[2]));
+      source.fail_line("the count of a list cannot be a " + in_quotes(fields[2]));
     property.column = {std::string(fields[4]), scalar_type(fields[3], source)};
   } else if (fields.size() == 3 && fields[1] != "list") {
     property.column = {std::string(fields[2]), scalar_type(fields[1], source)};
@@ -97,7 +97,7 @@ PlyHeader read_ply_header(Source& source) {
       if (header.elements.empty()) source.fail_line("a property before any element");
       header.elements.back().properties.push_back(property_of(fields, source));
     } else {
-      source.fail_line("unknown keyword " + quoted(fields[0]));
+      source.fail_line("unknown keyword " + in_quotes(fields[0]));
     }
   }
   source.fail("the header has no line: end_header");

@@ -66,7 +66,7 @@ std::string names_of(const Table& table) {
   constexpr std::size_t kShown = 12;
   std::string text;
   for (std::size_t k = 0; k < std::min(kShown, table.columns.size()); ++k)
-    text += (k == 0 ? "" : ", ") + files::quoted(table.columns[k].name);
+    text += (k == 0 ? "" : ", ") + files::in_quotes(table.columns[k].name);
   return table.columns.size() > kShown ? text + ", ..." : text;
 }
 

@@ -171,7 +171,7 @@ std::vector<StoredScan> index_e57(const std::string& path) {
     if (!walker.ends) continue;
     if (open.empty() || open.back() != walker.tag)
       Source(path, "").fail("damaged: its list of scans has a wrong tag " +
-                            files::quoted(walker.tag));
+                            files::in_quotes(walker.tag));
     if (is_scan(4) && walker.tag == "name") scans.back().name = walker.text;
     if (is_scan(6) && open[3] == "pose") {
       const std::string name = open[4] + "/" + open[5];

@@ -14,7 +14,7 @@ namespace gpureg::io {
 namespace {
 
 using Fields = std::vector<std::string_view>;
-using files::quoted;
+using files::in_quotes;
 
 enum class Data { ascii, binary, binary_compressed };
 
@@ -43,7 +43,7 @@ Eigen::Vector3d viewpoint_of(const Fields& fields, const Source& source) {
     const auto [stop, error] = files::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || stop != text.data() + text.size() ||
         !std::isfinite(static_cast<float>(value)))
-      source.fail_line("VIEWPOINT has " + quoted(text) + ", expected a finite number");
+      source.fail_line("VIEWPOINT has " + in_quotes(text) + ", expected a finite number");
     t[static_cast<Eigen::Index>(k)] = value;
   }
   return t;
@@ -85,7 +85,7 @@ Header read_header(Source& source) {
       header.data = data_of(fields, source);
       return header;
     } else {
-      source.fail_line("unknown keyword " + quoted(fields[0]));
+      source.fail_line("unknown keyword " + in_quotes(fields[0]));
     }
   }
   source.fail("the header has no line: DATA");
@@ -102,8 +102,8 @@ Scalar scalar_type(std::string_view type, std::string_view size, std::string_vie
     if (size == "4") return is_signed ? Scalar::int32 : Scalar::uint32;
     if (size == "8") return is_signed ? Scalar::int64 : Scalar::uint64;
   }
-  source.fail("field " + quoted(name) + " has type " + quoted(type) + " and size " + quoted(size) +
-              ", expected F of 4 or 8, I or U of 1, 2, 4 or 8");
+  source.fail("field " + in_quotes(name) + " has type " + in_quotes(type) + " and size " +
+              in_quotes(size) + ", expected F of 4 or 8, I or U of 1, 2, 4 or 8");
 }
 
 std::size_t rows_of(const Header& header, const Source& source) {
@@ -140,7 +140,7 @@ Table table_of(const Header& header, const Source& source) {
     constexpr std::size_t kMaxCount = 65536;
     if (!header.counts.empty() && (!parse_count(header.counts[k], column.count) ||
                                    column.count < 1 || column.count > kMaxCount))
-      source.fail("field " + quoted(column.name) + " has COUNT " + quoted(header.counts[k]) +
+      source.fail("field " + in_quotes(column.name) + " has COUNT " + in_quotes(header.counts[k]) +
                   ", expected 1 to 65536");
     table.columns.push_back(std::move(column));
   }

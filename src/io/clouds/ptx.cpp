@@ -139,7 +139,8 @@ PointCloud read_ptx(Source& source, std::size_t index) {
     Eigen::Vector3d p;
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (!parse_coordinate(fields[axis], p[static_cast<Eigen::Index>(axis)]))
-        source.fail_line("a coordinate is " + files::quoted(fields[axis]) + ", expected a number");
+        source.fail_line("a coordinate is " + files::in_quotes(fields[axis]) +
+                         ", expected a number");
     if (!p.isZero(0)) points.push_back(p);
   }
   PointCloud cloud;

@@ -17,7 +17,7 @@ namespace gpureg::io {
 namespace {
 
 using Fields = std::vector<std::string_view>;
-using files::quoted;
+using files::in_quotes;
 
 /// Of a row of names; a row of numbers is cut no further than its coordinates.
 constexpr std::size_t kMostColumns = 4096;
@@ -222,13 +222,13 @@ class Reader {
     if (take_names(line)) return false;
     std::string names;
     for (std::size_t k = 0; k < std::min<std::size_t>(fields_.size(), 12); ++k)
-      names += (k == 0 ? "" : ", ") + quoted(fields_[k]);
+      names += (k == 0 ? "" : ", ") + in_quotes(fields_[k]);
     source_.fail_line("expected a row of x y z, or of names with x, y and z among them; found " +
                       names);
   }
 
   [[noreturn]] void fail_decimal_comma(std::string_view line) const {
-    source_.fail_line(quoted(line) +
+    source_.fail_line(in_quotes(line) +
                       " has decimal commas: write the numbers with decimal points, as 1.5");
   }
 
@@ -237,7 +237,7 @@ class Reader {
     double number = std::numeric_limits<double>::quiet_NaN();
     if (!text.empty() && !parse_coordinate(text, number)) {
       if (has_decimal_commas(line)) fail_decimal_comma(line);
-      source_.fail_line(std::string(name) + " is " + quoted(text) + ", expected a number");
+      source_.fail_line(std::string(name) + " is " + in_quotes(text) + ", expected a number");
     }
     return number;
   }

@@ -34,7 +34,7 @@ Eigen::Vector3d vertex_of(const Fields& fields, const Source& source) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (fields.size() < 4) source.fail_line("expected: v x y z");
     if (!parse_coordinate(fields[axis + 1], p[static_cast<Eigen::Index>(axis)]))
-      source.fail_line("a coordinate is " + files::quoted(fields[axis + 1]) +
+      source.fail_line("a coordinate is " + files::in_quotes(fields[axis + 1]) +
                        ", expected a number");
   }
   return p;
@@ -49,7 +49,7 @@ double corner_of(std::string_view field, std::size_t vertices, const Source& sou
   const std::int64_t vertex =
       number < 0 ? static_cast<std::int64_t>(vertices) + number : number - 1;
   if (error != std::errc() || stop != text.data() + text.size() || vertex < 0)
-    source.fail_line("a corner of a face is " + files::quoted(field) +
+    source.fail_line("a corner of a face is " + files::in_quotes(field) +
                      ", expected the number of a vertex");
   return static_cast<double>(vertex);
 }

@@ -62,7 +62,7 @@ void read_vertices(const OffHeader& header, Source& source, Take&& take) {
                        std::to_string(numbers));
     for (std::size_t k = 0; k < numbers; ++k)
       if (!parse_coordinate(fields[k], p[k]))
-        source.fail_line("a coordinate is " + files::quoted(fields[k]) + ", expected a number");
+        source.fail_line("a coordinate is " + files::in_quotes(fields[k]) + ", expected a number");
     take(Eigen::Vector3d(p[0], p[1], p[2]), Eigen::Vector3d(p[3], p[4], p[5]));
   }
 }
@@ -101,7 +101,7 @@ Polygons read_off(Source& source) {
     for (std::size_t k = 1; k <= corners; ++k) {
       double vertex = 0;
       if (!parse_coordinate(fields[k], vertex))
-        source.fail_line("a vertex of a face is " + files::quoted(fields[k]) +
+        source.fail_line("a vertex of a face is " + files::in_quotes(fields[k]) +
                          ", expected a number");
       out.add_corner(vertex, source);
     }

@@ -53,7 +53,7 @@ Polygons read_text(Source& source) {
     Eigen::Vector3d& p = out.vertices.emplace_back();
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (!parse_coordinate(fields[axis + 1], p[static_cast<Eigen::Index>(axis)]))
-        source.fail_line("a coordinate is " + files::quoted(fields[axis + 1]) +
+        source.fail_line("a coordinate is " + files::in_quotes(fields[axis + 1]) +
                          ", expected a number");
   }
   if (in_face) source.fail("truncated: the file ends within a face");

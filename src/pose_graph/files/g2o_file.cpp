@@ -102,7 +102,7 @@ Graph read_g2o(const std::string& path, G2oRotation rotation) {
       for (std::size_t k = 1; k < file.fields().size(); ++k)
         fixed.emplace_back(file.index(k, "the id"), file.line());
     } else {
-      file.fail("the tag is " + files::quoted(tag) +
+      file.fail("the tag is " + files::in_quotes(tag) +
                 ", expected VERTEX_SE3:QUAT, EDGE_SE3:QUAT or FIX");
     }
   }

@@ -66,7 +66,7 @@ class Parser {
 
   void expect(char c) {
     if (peek() != c)
-      fail(std::string("expected '") + c + "', found " + files::quoted(text_.substr(at_, 1)));
+      fail(std::string("expected '") + c + "', found " + files::in_quotes(text_.substr(at_, 1)));
     ++at_;
   }
 
@@ -107,7 +107,7 @@ class Parser {
     for (;;) {
       if (peek() != '"') fail("expected the name of a member");
       std::string name = string();
-      if (members->count(name) > 0) fail("the member " + files::quoted(name) + " stands twice");
+      if (members->count(name) > 0) fail("the member " + files::in_quotes(name) + " stands twice");
       expect(':');
       members->emplace(std::move(name), parse(depth + 1));
       if (peek() == '}') break;
@@ -153,7 +153,7 @@ class Parser {
     const bool starts = *begin == '-' || (*begin >= '0' && *begin <= '9');
     if (!starts || error != std::errc() || !std::isfinite(value)) {
       const std::size_t stop = text_.find_first_of(" \t\r\n,]}", at_);
-      fail("expected a JSON value, found " + files::quoted(text_.substr(at_, stop - at_)));
+      fail("expected a JSON value, found " + files::in_quotes(text_.substr(at_, stop - at_)));
     }
     at_ += static_cast<std::size_t>(end - begin);
     return value;
