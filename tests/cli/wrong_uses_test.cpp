@@ -140,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(
         Use{"Millimetres",
             align("a.ply", "millimetres.ply"),
             1,
-            {"note: are the units different? target is 1", "millimetres and metres",
+            {"try      are the units different? target is 1", "millimetres and metres",
              "no_usable_features"}},
         Use{"MillimetresAndAuto",
             align("a.ply", "millimetres.ply", {"--voxel-size", "auto", "--backend", "cpu"}),

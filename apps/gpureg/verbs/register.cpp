@@ -46,6 +46,7 @@ struct RegisterOptions {
   bool refine_initial = false, ignore_alternatives = false;
   ViewpointChoice source_viewpoint, target_viewpoint;
   UpChoice up;
+  std::string other_units, perhaps_other_units;  // questions about a pair that is not aligned
 };
 
 std::string describe(const PrepareStatistics& s) {
@@ -67,7 +68,10 @@ std::string next_step(const RegisterOptions& o, RegistrationReason reason) {
   if (!o.initial.empty() && (reason == RegistrationReason::no_candidate ||
                              reason == RegistrationReason::too_little_overlap))
     return "is the pose target_from_source, not its inverse, and in the unit of the clouds?";
+  // Whatever else is wrong follows from it.
+  if (!o.other_units.empty()) return o.other_units + "; bring both to one unit";
   std::string next = in_option_names(advice(reason));
+  if (!o.perhaps_other_units.empty()) next += "; " + o.perhaps_other_units;
   const bool nowhere = reason == RegistrationReason::too_little_overlap ||
                        reason == RegistrationReason::no_candidate ||
                        reason == RegistrationReason::contradicts_prior ||
@@ -91,9 +95,8 @@ void print_reason(const RegisterOptions& o, const RegistrationResult& r) {
 /// On stderr, what may be a mistake of the caller and is none of the clouds alone.
 void note_pair(const RegisterOptions& o, const PointCloud& source, const PointCloud& target,
                bool aligned) {
-  // Parts of scenes differ by the ratios of feet, inches and centimetres, too.
-  const std::string units =
-      question_units(source.view(), target.view(), aligned ? kSuspectRatio : kLeastUnitRatio);
+  // Of a pair that is not aligned, it is what to try.
+  const std::string units = aligned ? question_units(source.view(), target.view()) : std::string();
   for (const std::string& note : {units, o.method.suggestion_text({source.view(), target.view()})})
     if (!note.empty()) std::cerr << "gpureg: note: " << note << std::endl;
   std::error_code ignored;
@@ -312,6 +315,12 @@ int run(RegisterOptions o) {
     timed.result = o.initial.empty() ? align(context, source, target, prior, options)
                                      : verify(o, context, source, target, initial, options);
   const RegistrationResult& result = timed.result;
+  if (!result.aligned()) {
+    o.other_units = question_units(source_cloud.view(), target_cloud.view());
+    // Parts of scenes differ by the ratios of feet, inches and centimetres, too.
+    o.perhaps_other_units =
+        question_units(source_cloud.view(), target_cloud.view(), kLeastUnitRatio);
+  }
   if (o.initial.empty())
     print_report(o, context, source, target, result);
   else
