@@ -133,8 +133,7 @@ std::string explain_violation(const PoseEvidence& e) {
            percent(higher(e.source_front_violation_near + e.source_front_violation_far,
                           e.target_front_violation_near + e.target_front_violation_far)) +
            " % of the points of a cloud hang in front of surfaces of the other one, where it "
-           "should "
-           "have seen them";
+           "should have seen them";
   return "under the best pose found, " + percent(violation_of(e)) +
          " % of the points in view of the other cloud's sensor lie where it saw free space";
 }
@@ -240,8 +239,7 @@ const char* advice(RegistrationReason reason) {
              "set";
     case RegistrationReason::contradicts_free_space:
       return "are the clouds of one place, and did nothing move? Then check the viewpoints, and "
-             "that "
-             "normals point to the sensor";
+             "that normals point to the sensor";
     case RegistrationReason::clutter:
       return "a larger voxel_size, which averages what is small, or clouds with more walls and "
              "ground";

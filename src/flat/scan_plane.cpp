@@ -22,10 +22,8 @@ constexpr double kRoundingOfFloats = 4 * 1.2e-7;
 /// Points that a plane is fitted to and that the test for curves looks at; those around which that
 /// counts.
 constexpr std::size_t kPlaneSample = 50'000, kCurvePlaces = 128;
-/// So many points tell almost every cloud that is not flat. They are farther from a plane of their
-/// own than from that of all points, by a factor that is below this one.
+/// This many points show of almost every 3-D cloud that it is not flat.
 constexpr std::size_t kFirstLook = 256;
-constexpr double kSlackOfFew = 4;
 /// Radius of the larger of two discs, in distances of neighbours and as a share of the extent; the
 /// other one is a fourth of it. A curve has four times as many points in the larger one, a filled
 /// plane sixteen times. It is wider than the noise of ranges, and narrower than a room.
@@ -137,7 +135,8 @@ double height_over(const ScanPlane& plane, const Point3& p) {
 
 bool may_be_flat(const std::vector<Point3>& few) {
   if (few.size() < 4) return true;
-  const double slack = kSlackOfFew * PlaneBox(few).slack();
+  // Least squares: no residual is above the root of their sum of squares, which is least.
+  const double slack = std::sqrt(static_cast<double>(few.size())) * PlaneBox(few).slack();
   const std::optional<ScanPlane> plane = fitted_plane(few, 0);
   return !plane || std::all_of(few.begin(), few.end(),
                                [&](const Point3& p) { return height_over(*plane, p) <= slack; });

@@ -144,7 +144,7 @@ int run(const ViewOptions& o) {
   const std::string page = fs::absolute(page_of(o.path)).lexically_normal().string();
   std::cout << page << "\n";
   if (!o.print && has_display() && !open_page(page))
-    std::cerr << "note: there is no xdg-open: open the page yourself\n";
+    std::cerr << "gpureg: note: there is no xdg-open: open the page yourself\n";
   return kOk;
 }
 
