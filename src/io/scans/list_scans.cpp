@@ -122,7 +122,10 @@ std::vector<ScanFile> of_folder(const std::string& folder, bool recursive, Notes
     if (std::vector<ScanFile> fragments = fragments_of(contents); !fragments.empty()) {
       std::vector<std::string> others;
       for (const Found& cloud : contents.clouds)
-        if (!fragment_number(cloud.name)) others.push_back(cloud.name);
+        // Text beside fragments is a list or a table, as gt_overlap.txt.
+        if (!fragment_number(cloud.name) && extension_of(cloud.name) != ".txt" &&
+            extension_of(cloud.name) != ".csv")
+          others.push_back(cloud.name);
       if (notes != nullptr && !others.empty())
         notes->push_back("beside cloud_bin_<i>, " + std::to_string(others.size()) +
                          (others.size() == 1 ? " other cloud of " : " other clouds of ") + folder +
