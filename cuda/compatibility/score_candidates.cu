@@ -37,22 +37,20 @@ __device__ SideEvidence score_sample(std::uint32_t warp, std::uint32_t warps,
                                      const CloudView& moved, const CloudView& other,
                                      const CellSummaries& cells, const Rigid& pose,
                                      const EvidenceTest& test) {
-  SideEvidence e{};
+  LaneEvidence mine;
   const std::uint32_t maps = coarse_score_maps(other.visibility);
   for (std::uint32_t i = 32 * warp + threadIdx.x % 32; i < moved.size; i += 32 * warps) {
-    compare_point(moved, other, cells, pose, test, maps, i, e);
+    compare_point(moved, other, cells, pose, test, maps, i, mine);
   }
-  e.normal_weighted =
-      static_cast<std::uint64_t>(warp_sum(static_cast<std::int64_t>(e.normal_weighted)));
-  e.observed = warp_sum(e.observed);
-  e.violating = warp_sum(e.violating);
+  SideEvidence e{};
+  e[Term::normal_weighted] = warp_sum(mine.sum[static_cast<int>(Term::normal_weighted)]);
+  for (const Term term : {Term::observed, Term::violating}) e[term] = warp_sum(mine.points(term));
   return e;
 }
 
 __device__ SideEvidence sum_for_score(SideEvidence a, const SideEvidence& b) {
-  a.normal_weighted += b.normal_weighted;
-  a.observed += b.observed;
-  a.violating += b.violating;
+  for (const Term term : {Term::normal_weighted, Term::observed, Term::violating})
+    a[term] += b[term];
   return a;
 }
 

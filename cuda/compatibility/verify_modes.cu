@@ -12,7 +12,6 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 128, kWarps = kThreads / 32;
-constexpr int kSideSums = 14;
 constexpr std::uint32_t kInformationSums = 24;
 
 struct VerifyModes {
@@ -37,55 +36,8 @@ __device__ void put(T& out, T value, bool alone) {
     atomicAdd(reinterpret_cast<Atomic*>(&out), static_cast<Atomic>(value));
 }
 __device__ void put(SideEvidence& out, const SideEvidence& e, bool alone) {
-  put(out.normal_weighted, e.normal_weighted, alone);
-  put(out.residual, e.residual, alone);
-  put(out.incidence_observed, e.incidence_observed, alone);
-  put(out.incidence_violating, e.incidence_violating, alone);
-  put(out.tested, e.tested, alone);
-  put(out.inliers, e.inliers, alone);
-  put(out.hits, e.hits, alone);
-  put(out.observed, e.observed, alone);
-  put(out.violating, e.violating, alone);
-  put(out.occluded, e.occluded, alone);
-  put(out.near_surface, e.near_surface, alone);
-  put(out.front_violation_near, e.front_violation_near, alone);
-  put(out.front_violation_far, e.front_violation_far, alone);
-  put(out.behind_surface, e.behind_surface, alone);
-}
-/// Sum over the block, in thread 0.
-__device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
-  std::int64_t v[kSideSums];
-  v[0] = static_cast<std::int64_t>(e.normal_weighted);
-  v[1] = static_cast<std::int64_t>(e.residual);
-  v[2] = static_cast<std::int64_t>(e.incidence_observed);
-  v[3] = static_cast<std::int64_t>(e.incidence_violating);
-  v[4] = e.tested;
-  v[5] = e.inliers;
-  v[6] = e.hits;
-  v[7] = e.observed;
-  v[8] = e.violating;
-  v[9] = e.occluded;
-  v[10] = e.near_surface;
-  v[11] = e.front_violation_near;
-  v[12] = e.front_violation_far;
-  v[13] = e.behind_surface;
-  block_sum(v, scratch);
-  SideEvidence sum{};
-  sum.normal_weighted = static_cast<std::uint64_t>(v[0]);
-  sum.residual = static_cast<std::uint64_t>(v[1]);
-  sum.incidence_observed = static_cast<std::uint64_t>(v[2]);
-  sum.incidence_violating = static_cast<std::uint64_t>(v[3]);
-  sum.tested = static_cast<std::uint32_t>(v[4]);
-  sum.inliers = static_cast<std::uint32_t>(v[5]);
-  sum.hits = static_cast<std::uint32_t>(v[6]);
-  sum.observed = static_cast<std::uint32_t>(v[7]);
-  sum.violating = static_cast<std::uint32_t>(v[8]);
-  sum.occluded = static_cast<std::uint32_t>(v[9]);
-  sum.near_surface = static_cast<std::uint32_t>(v[10]);
-  sum.front_violation_near = static_cast<std::uint32_t>(v[11]);
-  sum.front_violation_far = static_cast<std::uint32_t>(v[12]);
-  sum.behind_surface = static_cast<std::uint32_t>(v[13]);
-  return sum;
+#pragma unroll
+  for (std::uint32_t k = 0; k < kTerms; ++k) put(out.sum[k], e.sum[k], alone);
 }
 
 __device__ MatchEvidence count_matches(const VerifyModes& w, std::uint32_t p, const Rigid& rigid,
@@ -123,14 +75,14 @@ struct Share {
 
 /// The points of the target in the source.
 __device__ void compare_target(const VerifyModes& w, const Share& share) {
-  __shared__ std::int64_t scratch[kWarps * kSideSums];
+  __shared__ std::int64_t scratch[kWarps * kTerms];
   const CloudView &s = w.pairs[share.p].source, &t = w.pairs[share.p].target;
   const Rigid back = inverse(to_rigid(w.modes[share.mode].pose));
-  SideEvidence side{};
+  LaneEvidence mine;
   for (std::uint32_t i = share.first; i < t.size; i += share.step) {
-    compare_point(t, s, w.pairs[share.p].source_cells, back, w.test, s.visibility.count, i, side);
+    compare_point(t, s, w.pairs[share.p].source_cells, back, w.test, s.visibility.count, i, mine);
   }
-  side = of_block(side, scratch);
+  const SideEvidence side = block_sum(mine, scratch);
   if (threadIdx.x == 0) put(w.out[share.mode].target, side, share.alone);
 }
 
@@ -174,7 +126,7 @@ __device__ LaneSum moment_sum(std::uint32_t k, std::uint32_t first) {
 /// moments over the points of its warp: two registers instead of one for each of 42 sums.
 __device__ void compare_source(const VerifyModes& w, const Share& share) {
   __shared__ SumRow rows[kWarps][32];
-  __shared__ std::int64_t scratch[kWarps * kSideSums], partial[kWarps][2 * 32];
+  __shared__ std::int64_t scratch[kWarps * kTerms], partial[kWarps][2 * 32];
   static_assert(kIcpFixedScale == kMomentFixedScale, "one conversion for all sums");
   const SearchPair& pair = w.pairs[share.p];
   const CloudView &s = pair.source, &t = pair.target;
@@ -186,12 +138,12 @@ __device__ void compare_source(const VerifyModes& w, const Share& share) {
   LaneSum information = information_sum(lane),
           moment = lane < 9 ? moment_sum(lane, SumRow::kSource)
                             : moment_sum(lane < 18 ? lane - 9 : 0, SumRow::kTarget);
-  SideEvidence side{};
+  LaneEvidence mine;
   for (std::uint32_t base = share.first - lane; base < s.size; base += share.step) {
     const std::uint32_t i = base + lane;
     ComparedWith found{{0, {0, 0, 0}, kPackedZero, kNoValue, kNoValue}, false};
     if (i < s.size)
-      found = compare_point(s, t, pair.target_cells, there, w.test, t.visibility.count, i, side);
+      found = compare_point(s, t, pair.target_cells, there, w.test, t.visibility.count, i, mine);
     const bool hit = found.closest.found();
     const unsigned hits = __ballot_sync(~0u, hit), inliers = __ballot_sync(~0u, found.inlier);
     const int inlier_count = __popc(static_cast<int>(inliers)),
@@ -217,7 +169,7 @@ __device__ void compare_source(const VerifyModes& w, const Share& share) {
     for (int k = 0; k < inlier_count; ++k) information.add(row(k));
     __syncwarp();
   }
-  side = of_block(side, scratch);
+  const SideEvidence side = block_sum(mine, scratch);
   partial[warp][lane] = information.total;
   partial[warp][32 + lane] = moment.total;
   __syncthreads();
@@ -242,8 +194,8 @@ __device__ void compare_source(const VerifyModes& w, const Share& share) {
   put(out.matches.target_weight, matches.target_weight, share.alone);
   put(out.matches.inliers, matches.inliers, share.alone);
   put(out.source, side, share.alone);
-  put(out.source_moments.count, std::uint64_t(side.hits), share.alone);
-  put(out.target_moments.count, std::uint64_t(side.hits), share.alone);
+  put(out.source_moments.count, static_cast<std::uint64_t>(side[Term::hits]), share.alone);
+  put(out.target_moments.count, static_cast<std::uint64_t>(side[Term::hits]), share.alone);
 }
 
 /// One or several thread blocks per mode (z).

@@ -3,30 +3,11 @@
 
 #include "algorithm/cloud.hpp"
 #include "algorithm/icp.hpp"
-#include "algorithm/inlier.hpp"
 #include "algorithm/normal_weight.hpp"
+#include "algorithm/side_evidence.hpp"
 #include "math/trigonometry.hpp"
 
 namespace gpureg {
-
-/// Evidence of one side of a pose: counts over the points of one cloud moved into the other.
-/// Integers, so that every order of summation gives the same bits.
-struct SideEvidence {
-  std::uint64_t normal_weighted;  ///< sum of the normal weights of the inliers
-  std::uint64_t residual;         ///< of the inliers, see fixed_residual
-  /// Sums of incidence(), the maximum over the viewpoints, of the observed and of the violating
-  /// points.
-  std::uint64_t incidence_observed, incidence_violating;
-  std::uint32_t tested;        ///< points compared
-  std::uint32_t inliers;       ///< closest point within the distance, normals within the angle
-  std::uint32_t hits;          ///< closest point within the distance, whatever the normals
-  std::uint32_t observed;      ///< in a direction that a viewpoint of the other cloud observed
-  std::uint32_t violating;     ///< in observed free space, without a point within the distance
-  std::uint32_t occluded;      ///< behind every surface observed in their direction
-  std::uint32_t near_surface;  ///< in a marked cell of the other cloud, see surface_sides.hpp
-  /// Points without a hit outside surface cells, each counted at the first side that applies.
-  std::uint32_t front_violation_near, front_violation_far, behind_surface;
-};
 
 /// Matches that a pose brings within the consensus distance: their number and the sums of their
 /// normal weights (normal_weight.hpp).
@@ -35,82 +16,12 @@ struct MatchEvidence {
   std::uint32_t inliers;
 };
 
-/// Thresholds of the evidence.
-struct EvidenceTest {
-  InlierTest inlier;
-  float margin, min_range;
-};
-
 /// Sums for the information matrix of the inliers: 21 entries of J'J and the sum of the arms, as in
 /// IcpSums.
 struct InformationSums {
   std::int64_t v[21];
   std::int64_t arm[3];
 };
-
-/// Counts a point by its side of the surfaces. side: bits of SurfaceSide; hit: it has a closest
-/// point.
-GPUREG_HD void add_surface_side(std::uint32_t side, bool hit, SideEvidence& e) {
-  const bool open = !hit & ((side & kOnSurface) == 0), near = (side & kFrontNear) != 0,
-             far = (side & kFrontFar) != 0;
-  e.near_surface += side != 0 ? 1u : 0u;
-  e.front_violation_near += open & near ? 1u : 0u;
-  e.front_violation_far += open & !near & far ? 1u : 0u;
-  e.behind_surface += open & !near & !far & (side != 0) ? 1u : 0u;
-}
-
-/// A moved point and its closest point in the other cloud.
-struct ComparedPoint {
-  Vec3 moved, normal;      ///< under the pose
-  bool hit, inlier;        ///< a closest point within the distance; with an agreeing normal
-  float squared_distance;  ///< of a hit
-  std::uint32_t weight;    ///< normal weight of the moved point
-};
-
-/// Adds the evidence of one point. maps: number of depth maps of the other cloud that are compared.
-GPUREG_HD void add_evidence(const ComparedPoint& p, const CloudView& other,
-                            const EvidenceTest& test, std::uint32_t maps, SideEvidence& e) {
-  const bool hit = p.hit, inlier = p.inlier;
-  bool observed = false, violating = false, surface = false;
-  float incidence_observed = 0.0f, incidence_violating = 0.0f;
-  for (std::uint32_t m = 0; m < maps; ++m) {
-    const Observation s = observe(other.visibility, m, p.moved, test.margin, test.min_range);
-    if (s == Observation::unknown) continue;
-    const float weight = incidence(p.normal, p.moved - other.visibility.viewpoints[m]);
-    observed = true;
-    incidence_observed = weight > incidence_observed ? weight : incidence_observed;
-    surface |= s == Observation::surface;
-    if (s != Observation::free_space) continue;
-    violating = true;
-    incidence_violating = weight > incidence_violating ? weight : incidence_violating;
-  }
-  violating &= !hit;
-  e.tested += 1;
-  e.hits += hit ? 1u : 0u;
-  e.inliers += inlier ? 1u : 0u;
-  e.normal_weighted += inlier ? p.weight : 0u;
-  e.residual += inlier ? fixed_residual(p.squared_distance, test.inlier.inverse_max_squared) : 0u;
-  e.observed += observed ? 1u : 0u;
-  e.violating += violating ? 1u : 0u;
-  e.incidence_observed += fixed_incidence(incidence_observed);
-  e.incidence_violating += violating ? fixed_incidence(incidence_violating) : 0u;
-  e.occluded += (observed & !violating & !surface & !hit) ? 1u : 0u;
-  add_surface_side(other.surface_sides.words ? surface_side_at(other.surface_sides, p.moved) : 0u,
-                   hit, e);
-}
-
-/// Adds the evidence of point i of `moved` under the pose.
-GPUREG_HD void verify_point(const CloudView& moved, const CloudView& other, const Rigid& pose,
-                            const EvidenceTest& test, std::uint32_t maps, std::uint32_t i,
-                            SideEvidence& e) {
-  const Vec3 q = apply(pose, moved.points[i]), normal = rotate(pose, moved.normals[i]);
-  const Closest c = find_closest(other.closest, other.points, q, test.inlier.max_squared);
-  const bool hit = c.index != kNoValue;
-  add_evidence(
-      {q, normal, hit, hit && normals_agree(normal, other.normals[c.index], test.inlier.min_cosine),
-       c.squared_distance, moved.normal_weight[i]},
-      other, test, maps, e);
-}
 
 /// Adds one inlier to the point-to-plane information.
 GPUREG_HD void add_information(const CloudView& moved, const Rigid& pose, std::uint32_t i,
@@ -174,14 +85,15 @@ constexpr float kViolationPenalty = 4.0f;
 /// match_share: in [0, 1]; weight_a, weight_b: normal weight of each side's whole sample.
 GPUREG_HD float coarse_score(float match_share, const SideEvidence& a, float weight_a,
                              const SideEvidence& b, float weight_b) {
-  const float overlap = static_cast<float>(a.normal_weighted) / weight_a +
-                        static_cast<float>(b.normal_weighted) / weight_b;
-  const float va =
-      a.observed > 0 ? static_cast<float>(a.violating) / static_cast<float>(a.observed) : 0.0f;
-  const float vb =
-      b.observed > 0 ? static_cast<float>(b.violating) / static_cast<float>(b.observed) : 0.0f;
+  const float overlap = static_cast<float>(a[Term::normal_weighted]) / weight_a +
+                        static_cast<float>(b[Term::normal_weighted]) / weight_b;
+  const auto violation = [](const SideEvidence& side) {
+    return side[Term::observed] > 0 ? static_cast<float>(side[Term::violating]) /
+                                          static_cast<float>(side[Term::observed])
+                                    : 0.0f;
+  };
   // 1 / (series of e^x), in float for speed.
-  const float x = kViolationPenalty * (va + vb);
+  const float x = kViolationPenalty * (violation(a) + violation(b));
   const float growth =
       fmaf(x, fmaf(x, fmaf(x, fmaf(x, 1.0f / 24.0f, 1.0f / 6.0f), 0.5f), 1.0f), 1.0f);
   return sqrtf(match_share) * overlap / growth;

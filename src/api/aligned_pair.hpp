@@ -56,9 +56,14 @@ struct AlignedPair {
                                               static_cast<double>(kResidualScale) / inliers)
                        : 0.0;
   }
+  double rmse(const SideEvidence& side) const {
+    return rmse(static_cast<std::uint64_t>(side[Term::residual]), side.points(Term::inliers));
+  }
   static confidence::OverlapCount overlap_of(const ModeOutcome& mode) {
-    return {std::min(mode.source.inliers, mode.target.inliers),
-            std::min(mode.source.tested, mode.target.tested)};
+    const auto least = [&](Term term) {
+      return std::min(mode.source.points(term), mode.target.points(term));
+    };
+    return {least(Term::inliers), least(Term::tested)};
   }
   confidence::Ranking ranking_of(const std::vector<PoseEvidence>& poses) const {
     return confidence::ranking_of(poses, source, target);

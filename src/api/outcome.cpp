@@ -174,11 +174,11 @@ void add_modes(const PairOutcome& outcome, const AlignedPair& pair, Registration
   result.has_candidate = true;
   result.target_from_source = result.modes.front().target_from_source;
   result.score = result.modes.front().confidence;
-  result.statistics.points_scored = best.source.tested;
-  result.statistics.inliers = result.statistics.consensus = best.source.inliers;
+  result.statistics.points_scored = best.source.points(Term::tested);
+  result.statistics.inliers = result.statistics.consensus = best.source.points(Term::inliers);
   result.statistics.refine_iterations = best.iterations;
   result.inlier_ratio = pipeline::inlier_ratio(result.statistics);
-  result.inlier_rmse = pair.rmse(best.source.residual, best.source.inliers);
+  result.inlier_rmse = pair.rmse(best.source);
   result.source_moments = pair.source_moments(best);
   result.target_moments = pair.target_moments(best);
 }

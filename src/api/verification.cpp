@@ -22,10 +22,10 @@ struct VerifiedPair : AlignedPair {
     PoseVerification out;
     out.target_from_source = transform_of(mode.pose);
     out.evidence = evidence;
-    out.inliers = mode.source.inliers;
-    out.points = mode.source.tested;
+    out.inliers = mode.source.points(Term::inliers);
+    out.points = mode.source.points(Term::tested);
     out.inlier_ratio = out.points > 0 ? static_cast<double>(out.inliers) / out.points : 0.0;
-    out.inlier_rmse = rmse(mode.source.residual, mode.source.inliers);
+    out.inlier_rmse = rmse(mode.source);
     out.source_moments = source_moments(mode);
     out.target_moments = target_moments(mode);
     return out;

@@ -34,9 +34,9 @@ Eigen::Matrix<double, 6, 6> centred_information(const ModeOutcome& mode, const P
   // Arms about the centre of the inliers, in the unit: (arm - c) x n = arm x n - c x n.
   const double unit = unit_length(moved.options), scale = radius / unit;
   Eigen::Vector3d c = Eigen::Vector3d::Zero();
-  if (mode.source.inliers > 0)
+  if (mode.source[Term::inliers] > 0)
     for (int k = 0; k < 3; ++k)
-      c[k] = static_cast<double>(sums.arm[k]) * fixed / mode.source.inliers;
+      c[k] = static_cast<double>(sums.arm[k]) * fixed / mode.source.points(Term::inliers);
   Eigen::Matrix3d cross;
   cross << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
   turn.topLeftCorner<3, 3>() *= scale;

@@ -12,14 +12,15 @@ double share(std::uint64_t part, std::uint64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-double residual(const SideEvidence& side) {
-  return side.inliers > 0 ? std::sqrt(static_cast<double>(side.residual) /
-                                      static_cast<double>(kResidualScale) / side.inliers)
-                          : 1.0;
+double share(const SideEvidence& side, Term part, Term whole) {
+  return share(static_cast<std::uint64_t>(side[part]), static_cast<std::uint64_t>(side[whole]));
 }
 
-double incidence_share(const SideEvidence& side) {
-  return share(side.incidence_observed, side.tested) / static_cast<double>(kIncidenceScale);
+double residual(const SideEvidence& side) {
+  const std::uint32_t inliers = side.points(Term::inliers);
+  return inliers > 0 ? std::sqrt(static_cast<double>(side[Term::residual]) /
+                                 static_cast<double>(kResidualScale) / inliers)
+                     : 1.0;
 }
 
 }  // namespace
@@ -35,28 +36,29 @@ PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
   e.match_inliers = mode.matches.inliers;
   e.match_support = std::min(share(mode.matches.source_weight, outcome.match_weight_source),
                              share(mode.matches.target_weight, outcome.match_weight_target));
-  e.source_overlap = share(s.inliers, s.tested);
-  e.target_overlap = share(t.inliers, t.tested);
-  e.source_overlap_any_normal = share(s.hits, s.tested);
-  e.target_overlap_any_normal = share(t.hits, t.tested);
+  // Share of `part` in `whole`, of both sides.
+  const auto shares = [&](double& source, double& target, Term part, Term whole = Term::tested) {
+    source = share(s, part, whole);
+    target = share(t, part, whole);
+  };
+  shares(e.source_overlap, e.target_overlap, Term::inliers);
+  shares(e.source_overlap_any_normal, e.target_overlap_any_normal, Term::hits);
+  shares(e.source_observed, e.target_observed, Term::incidence_observed);
+  e.source_observed /= static_cast<double>(kIncidenceScale);
+  e.target_observed /= static_cast<double>(kIncidenceScale);
+  shares(e.source_free_space_violation, e.target_free_space_violation, Term::incidence_violating,
+         Term::incidence_observed);
+  shares(e.source_occluded, e.target_occluded, Term::occluded, Term::observed);
+  shares(e.source_near_surface, e.target_near_surface, Term::near_surface);
+  shares(e.source_front_violation_near, e.target_front_violation_near, Term::front_violation_near);
+  shares(e.source_front_violation_far, e.target_front_violation_far, Term::front_violation_far);
+  shares(e.source_behind_surface, e.target_behind_surface, Term::behind_surface);
+  e.source_normal_weighted_overlap =
+      share(static_cast<std::uint64_t>(s[Term::normal_weighted]), whole_s);
+  e.target_normal_weighted_overlap =
+      share(static_cast<std::uint64_t>(t[Term::normal_weighted]), whole_t);
   e.source_residual = residual(s);
   e.target_residual = residual(t);
-  e.source_normal_weighted_overlap = share(s.normal_weighted, whole_s);
-  e.target_normal_weighted_overlap = share(t.normal_weighted, whole_t);
-  e.source_observed = incidence_share(s);
-  e.target_observed = incidence_share(t);
-  e.source_free_space_violation = share(s.incidence_violating, s.incidence_observed);
-  e.target_free_space_violation = share(t.incidence_violating, t.incidence_observed);
-  e.source_occluded = share(s.occluded, s.observed);
-  e.target_occluded = share(t.occluded, t.observed);
-  e.source_near_surface = share(s.near_surface, s.tested);
-  e.target_near_surface = share(t.near_surface, t.tested);
-  e.source_front_violation_near = share(s.front_violation_near, s.tested);
-  e.target_front_violation_near = share(t.front_violation_near, t.tested);
-  e.source_front_violation_far = share(s.front_violation_far, s.tested);
-  e.target_front_violation_far = share(t.front_violation_far, t.tested);
-  e.source_behind_surface = share(s.behind_surface, s.tested);
-  e.target_behind_surface = share(t.behind_surface, t.tested);
   const Eigen::Matrix3d fixed_from_moved =
       Eigen::Quaterniond(mode.pose.w, mode.pose.x, mode.pose.y, mode.pose.z)
           .normalized()

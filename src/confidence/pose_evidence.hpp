@@ -9,7 +9,7 @@
 namespace gpureg::confidence {
 
 inline bool without_overlap(const ModeOutcome& mode) {
-  return mode.source.inliers == 0 && mode.target.inliers == 0;
+  return mode.source[Term::inliers] == 0 && mode.target[Term::inliers] == 0;
 }
 
 /// Counts of a mode as shares. moved, fixed: the clouds in the engine; swapped: the moved cloud is

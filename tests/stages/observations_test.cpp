@@ -26,8 +26,10 @@ SideEvidence source_evidence(Exec& exec, const CpuCloud& source, const CpuCloud&
   return test::verified_in_place(exec, source, target).modes[0].source;
 }
 
-double share(std::uint64_t incidence, std::uint32_t points) {
-  return static_cast<double>(incidence) / static_cast<double>(kIncidenceScale) / points;
+/// Mean incidence of the points of a term.
+double mean(const SideEvidence& e, Term incidence) {
+  return static_cast<double>(e[incidence]) / static_cast<double>(kIncidenceScale) /
+         e.points(Term::tested);
 }
 
 TEST(Observations, IncidenceIsTheSquaredCosine) {
@@ -50,20 +52,20 @@ TEST(Observations, GrazingObservationsHardlyCount) {
   const auto target = seen_from(exec, wall, {0, 0, 0});
   const SideEvidence square = source_evidence(
       exec, *seen_from(exec, panel({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
-  EXPECT_EQ(square.violating, square.tested);
-  EXPECT_GT(share(square.incidence_violating, square.tested), 0.9);
-  EXPECT_EQ(square.incidence_observed, square.incidence_violating);
+  EXPECT_EQ(square[Term::violating], square[Term::tested]);
+  EXPECT_GT(mean(square, Term::incidence_violating), 0.9);
+  EXPECT_EQ(square[Term::incidence_observed], square[Term::incidence_violating]);
   // The same panel parallel to the line of sight.
   const SideEvidence edge = source_evidence(
       exec, *seen_from(exec, panel({0, 0, 2}, {0, 0, 1}, {0, 1, 0}), {3, 0, 2}), *target);
-  EXPECT_GT(edge.violating, edge.tested / 2);
-  EXPECT_LT(share(edge.incidence_violating, edge.tested), 0.05);
+  EXPECT_GT(edge[Term::violating], edge[Term::tested] / 2);
+  EXPECT_LT(mean(edge, Term::incidence_violating), 0.05);
   // Where it touches a surface it is not before one.
   const SideEvidence on = source_evidence(
       exec, *seen_from(exec, panel({0, 0, 3}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
-  EXPECT_EQ(on.violating, 0u);
-  EXPECT_EQ(on.incidence_violating, 0u);
-  EXPECT_GT(share(on.incidence_observed, on.tested), 0.9);
+  EXPECT_EQ(on[Term::violating], 0);
+  EXPECT_EQ(on[Term::incidence_violating], 0);
+  EXPECT_GT(mean(on, Term::incidence_observed), 0.9);
 }
 
 TEST(Observations, EvidenceInGroupsIsThatOfEachPoint) {
@@ -92,8 +94,8 @@ TEST(Observations, EvidenceInGroupsIsThatOfEachPoint) {
       add(each, expected);
       add(groups, found);
       EXPECT_EQ(each.all, groups.all);
-      EXPECT_GT(found.incidence_violating, 0u);
-      EXPECT_GT(found.front_violation_near, 0u);
+      EXPECT_GT(found[Term::incidence_violating], 0);
+      EXPECT_GT(found[Term::front_violation_near], 0);
     }
   }
 }

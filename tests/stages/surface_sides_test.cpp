@@ -140,16 +140,18 @@ TEST(SurfaceSides, ClassifyPointsByTheirSide) {
         .source;
   };
   const SideEvidence on = of(0), near = of(0.2f), far = of(0.4f), back = of(-0.3f), away = of(1.0f);
-  EXPECT_EQ(on.hits, on.tested);
-  EXPECT_EQ(on.near_surface, on.tested);
-  EXPECT_EQ(on.front_violation_near + on.front_violation_far + on.behind_surface, 0u);
-  EXPECT_GT(near.front_violation_near, near.tested * 9 / 10);
-  EXPECT_GT(far.front_violation_far, far.tested * 9 / 10);
-  EXPECT_GT(back.behind_surface, back.tested * 9 / 10);
-  EXPECT_EQ(near.front_violation_far + near.behind_surface + far.front_violation_near +
-                far.behind_surface + back.front_violation_near + back.front_violation_far,
-            0u);
-  EXPECT_EQ(away.near_surface, 0u);
+  EXPECT_EQ(on[Term::hits], on[Term::tested]);
+  EXPECT_EQ(on[Term::near_surface], on[Term::tested]);
+  EXPECT_EQ(
+      on[Term::front_violation_near] + on[Term::front_violation_far] + on[Term::behind_surface], 0);
+  EXPECT_GT(near[Term::front_violation_near], near[Term::tested] * 9 / 10);
+  EXPECT_GT(far[Term::front_violation_far], far[Term::tested] * 9 / 10);
+  EXPECT_GT(back[Term::behind_surface], back[Term::tested] * 9 / 10);
+  EXPECT_EQ(near[Term::front_violation_far] + near[Term::behind_surface] +
+                far[Term::front_violation_near] + far[Term::behind_surface] +
+                back[Term::front_violation_near] + back[Term::front_violation_far],
+            0);
+  EXPECT_EQ(away[Term::near_surface], 0);
 }
 
 }  // namespace

@@ -8,11 +8,7 @@
 
 namespace gpureg::test {
 
-inline void add(ByteWriter& out, const SideEvidence& e) {
-  out.add(e.normal_weighted, e.residual, e.tested, e.inliers, e.hits, e.observed, e.violating,
-          e.occluded, e.incidence_observed, e.incidence_violating, e.near_surface,
-          e.front_violation_near, e.front_violation_far, e.behind_surface);
-}
+inline void add(ByteWriter& out, const SideEvidence& e) { out.add(e.sum); }
 inline void add(ByteWriter& out, const MatchEvidence& e) {
   out.add(e.source_weight, e.target_weight, e.inliers);
 }

@@ -23,6 +23,7 @@ struct MovedGroup {
   static constexpr int kSize = 64;
   alignas(32) float x[kSize], y[kSize], z[kSize];
 
+  Vec3 at(int k) const { return {x[k], y[k], z[k]}; }
   void turn(const Rigid& pose, const float* nx, const float* ny, const float* nz) {
     for (int k = 0; k < kSize; ++k) {
       const Vec3 n = rotate(pose, {nx[k], ny[k], nz[k]});
@@ -54,7 +55,7 @@ GPUREG_ALWAYS_INLINE void add_observations_in_vectors(const VisibilityView& maps
   alignas(32) std::uint32_t steps[kSize];
   const Vec3 viewpoint = maps.viewpoints[map];
   for (int k = 0; k < kSize; ++k) {
-    const MapRay r = map_ray(Vec3{locations.x[k], locations.y[k], locations.z[k]} - viewpoint);
+    const MapRay r = map_ray(locations.at(k) - viewpoint);
     ray[k] = r.depth;
     cell[k] = r.cell;
   }
@@ -74,8 +75,7 @@ GPUREG_ALWAYS_INLINE void add_observations_in_vectors(const VisibilityView& maps
   if (incidences) {
     alignas(32) float weight[kSize];
     for (int k = 0; k < kSize; ++k)
-      weight[k] = incidence({normals->x[k], normals->y[k], normals->z[k]},
-                            Vec3{locations.x[k], locations.y[k], locations.z[k]} - viewpoint);
+      weight[k] = incidence(normals->at(k), locations.at(k) - viewpoint);
     for (int k = 0; k < kSize; ++k) {
       const float observed = known[k] ? weight[k] : 0.0f;
       const float violating = known[k] & before[k] ? weight[k] : 0.0f;

@@ -50,26 +50,27 @@ Sample sample_of(const CloudView& cloud, std::uint32_t most) {
   return out;
 }
 
+/// A group of 64 points under a pose.
+struct PosedGroup {
+  MovedGroup places, normals;
+  void move(const Side& side, const Rigid& pose, std::size_t group) {
+    const std::size_t k = group * MovedPoints::kGroup;
+    places.move(pose, &side.order.x[k], &side.order.y[k], &side.order.z[k]);
+  }
+  void turn(const Side& side, const Rigid& pose, std::size_t group) {
+    const std::size_t k = group * MovedPoints::kGroup;
+    normals.turn(pose, &side.order.nx[k], &side.order.ny[k], &side.order.nz[k]);
+  }
+};
+
 /// Observations of a group by the first `maps` maps of the other cloud, with incidences if
 /// requested.
-Observations observations_of(const Side& side, const Rigid& pose, std::size_t group,
-                             std::uint64_t present, const EvidenceTest& test, std::uint32_t maps,
-                             Incidences* incidences = nullptr) {
+Observations observations_of(const Side& side, const PosedGroup& at, const EvidenceTest& test,
+                             std::uint32_t maps, Incidences* incidences = nullptr) {
   Observations out;
-  if (maps == 0) return out;
-  const std::size_t first = group * MovedPoints::kGroup;
-  MovedGroup places, normals;
-  places.move(pose, side.order.x.data() + first, side.order.y.data() + first,
-              side.order.z.data() + first);
-  if (incidences)
-    normals.turn(pose, side.order.nx.data() + first, side.order.ny.data() + first,
-                 side.order.nz.data() + first);
   for (std::uint32_t m = 0; m < maps; ++m)
-    add_observations(side.other.visibility, m, places, test.margin, test.min_range, out, &normals,
-                     incidences);
-  out.observed &= present;
-  out.violating &= present;
-  out.surface &= present;
+    add_observations(side.other.visibility, m, at.places, test.margin, test.min_range, out,
+                     &at.normals, incidences);
   return out;
 }
 
@@ -82,14 +83,21 @@ std::uint32_t count(std::uint64_t mask) {
 SideEvidence score_sample(MovedPoints& points, const Side& side, const Sample& sample,
                           const Rigid& pose, const EvidenceTest& test, bool decide) {
   SideEvidence e{};
+  PosedGroup at;
   const std::uint32_t maps = coarse_score_maps(side.other.visibility);
   points.for_each_group(pose, [&](std::size_t group, const PointBounds& bounds) {
     const std::uint64_t present = points.present(group),
                         certain = decide ? bounds.certain & present : 0;
-    Observations s = observations_of(side, pose, group, present, test, maps);
+    Observations s;
+    if (maps > 0) {
+      at.move(side, pose, group);
+      s = observations_of(side, at, test, maps);
+    }
+    s.violating &= present;
     for (std::uint64_t left = certain; left != 0; left &= left - 1)
-      e.normal_weighted += sample.normal_weight[group * MovedPoints::kGroup +
-                                                static_cast<std::size_t>(__builtin_ctzll(left))];
+      e.add(Term::normal_weighted,
+            sample.normal_weight[group * MovedPoints::kGroup +
+                                 static_cast<std::size_t>(__builtin_ctzll(left))]);
     std::uint64_t hits = certain;
     const std::uint64_t open =
         (bounds.possible | points.near_any(group, s.violating)) & present & ~certain;
@@ -98,30 +106,12 @@ SideEvidence score_sample(MovedPoints& points, const Side& side, const Sample& s
       hits |= std::uint64_t(1) << k % MovedPoints::kGroup;
       const bool inlier = normals_agree(rotate(pose, points.normal(k)), side.other.normals[c.index],
                                         test.inlier.min_cosine);
-      e.normal_weighted += inlier ? sample.normal_weight[k] : 0u;
+      e.add(Term::normal_weighted, inlier ? sample.normal_weight[k] : 0u);
     });
-    e.observed += count(s.observed);
-    e.violating += count(s.violating & ~hits);
+    e.add(Term::observed, count(s.observed & present));
+    e.add(Term::violating, count(s.violating & ~hits));
   });
   return e;
-}
-
-std::uint64_t sum_incidences(const float (&incidences)[64], std::uint64_t mask) {
-  std::uint64_t sum = 0;
-  for (int k = 0; k < 64; ++k) sum += (mask >> k & 1) != 0 ? fixed_incidence(incidences[k]) : 0u;
-  return sum;
-}
-
-/// add_surface_side() of the points of a group.
-void add_surface_sides(const MovedPoints& points, std::size_t group, std::uint64_t present,
-                       std::uint64_t hits, const Rigid& pose, const SurfaceSideView& surface_sides,
-                       SideEvidence& e) {
-  if (!surface_sides.words) return;
-  for (std::uint64_t left = present; left != 0; left &= left - 1) {
-    const int k = __builtin_ctzll(left);
-    const Vec3 p = points.point(group * MovedPoints::kGroup + static_cast<std::size_t>(k));
-    add_surface_side(surface_side_at(surface_sides, apply(pose, p)), (hits >> k & 1) != 0, e);
-  }
 }
 
 /// verify_point() of all points of one side. Calls visit(k, closest, inlier) for the points with a
@@ -130,34 +120,38 @@ template <typename Visit>
 SideEvidence verify_side(MovedPoints& points, const Side& side, const Rigid& pose,
                          const EvidenceTest& test, Visit&& visit) {
   SideEvidence e{};
+  PosedGroup at;
   points.for_each_group(pose, [&](std::size_t group, const PointBounds&) {
     const std::uint64_t present = points.present(group);
+    at.move(side, pose, group);
+    at.turn(side, pose, group);
     Incidences incidences;
     const Observations s =
-        observations_of(side, pose, group, present, test, side.other.visibility.count, &incidences);
-    std::uint64_t hits = 0;
-    points.closest(
-        pose, group, points.near_any(group, present), test.inlier.max_squared,
-        [&](std::size_t k, Vec3, Closest c) {
-          if (c.index == kNoValue) return;
-          hits |= std::uint64_t(1) << k % MovedPoints::kGroup;
-          const bool inlier = normals_agree(rotate(pose, points.normal(k)),
-                                            side.other.normals[c.index], test.inlier.min_cosine);
-          e.inliers += inlier ? 1u : 0u;
-          e.normal_weighted += inlier ? side.moved.normal_weight[side.order.index[k]] : 0u;
-          e.residual +=
-              inlier ? fixed_residual(c.squared_distance, test.inlier.inverse_max_squared) : 0u;
-          visit(side.order.index[k], c, inlier);
-        });
-    add_surface_sides(points, group, present, hits, pose, side.other.surface_sides, e);
-    const std::uint64_t before = s.violating & ~hits;
-    e.tested += count(present);
-    e.hits += count(hits);
-    e.observed += count(s.observed);
-    e.violating += count(before);
-    e.incidence_observed += sum_incidences(incidences.observed, s.observed);
-    e.incidence_violating += sum_incidences(incidences.violating, before);
-    e.occluded += count(s.observed & ~before & ~s.surface & ~hits);
+        observations_of(side, at, test, side.other.visibility.count, &incidences);
+    ComparedPoint compared[MovedPoints::kGroup] = {};
+    points.closest(pose, group, points.near_any(group, present), test.inlier.max_squared,
+                   [&](std::size_t k, Vec3, Closest c) {
+                     if (c.index == kNoValue) return;
+                     const bool inlier =
+                         normals_agree(rotate(pose, points.normal(k)), side.other.normals[c.index],
+                                       test.inlier.min_cosine);
+                     ComparedPoint& p = compared[k % MovedPoints::kGroup];
+                     p.hit = true;
+                     p.inlier = inlier;
+                     p.squared_distance = c.squared_distance;
+                     p.weight = inlier ? side.moved.normal_weight[side.order.index[k]] : 0u;
+                     visit(side.order.index[k], c, inlier);
+                   });
+    for (std::uint64_t left = present; left != 0; left &= left - 1) {
+      const int k = __builtin_ctzll(left);
+      const auto in = [&](std::uint64_t mask) { return (mask >> k & 1) != 0; };
+      ComparedPoint& p = compared[k];
+      p.moved = at.places.at(k);
+      p.normal = at.normals.at(k);
+      p.seen = {in(s.observed), in(s.violating), in(s.surface), incidences.observed[k],
+                incidences.violating[k]};
+      add_evidence(p, side.other, test, e);
+    }
   });
   return e;
 }
