@@ -12,6 +12,8 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 128, kWarps = kThreads / 32;
+/// Of a multiprocessor at least. Without it, one more term of evidence takes 14 registers more.
+constexpr int kBlocks = 6;
 constexpr std::uint32_t kInformationSums = 24;
 
 struct VerifyModes {
@@ -199,14 +201,14 @@ __device__ void compare_source(const VerifyModes& w, const Share& share) {
 }
 
 /// One or several thread blocks per mode (z).
-__global__ void __launch_bounds__(kThreads) verify_target(VerifyModes w) {
+__global__ void __launch_bounds__(kThreads, kBlocks) verify_target(VerifyModes w) {
   if (blockIdx.x < w.count[blockIdx.y]) compare_target(w, Share(w, blockIdx.z, gridDim.z));
 }
-__global__ void __launch_bounds__(kThreads) verify_source(VerifyModes w) {
+__global__ void __launch_bounds__(kThreads, kBlocks) verify_source(VerifyModes w) {
   if (blockIdx.x < w.count[blockIdx.y]) compare_source(w, Share(w, blockIdx.z, gridDim.z));
 }
 /// Both at the same time: half of the blocks each.
-__global__ void __launch_bounds__(kThreads) verify_both(VerifyModes w) {
+__global__ void __launch_bounds__(kThreads, kBlocks) verify_both(VerifyModes w) {
   if (blockIdx.x >= w.count[blockIdx.y]) return;
   const Share share(w, blockIdx.z / 2, gridDim.z / 2);
   if (blockIdx.z % 2 == 0)
