@@ -10,13 +10,14 @@
 #include "algorithm/quadruple.hpp"
 #include "cuda/common/nearest_feature.hpp"
 #include "cuda/common/prepared_cloud.hpp"
+#include "cuda/device/launch.cuh"
 #include "gpureg/error.hpp"
 
 namespace gpureg::bench {
 namespace {
 
 using cuda::check;
-using cuda::check_launch;
+using cuda::launch;
 
 constexpr int kThreads = 256;
 
@@ -166,27 +167,23 @@ NaiveResult Naive::align(const PreparedState& source_state, const PreparedState&
     return static_cast<unsigned>((items + kThreads - 1) / kThreads);
   };
   check(cudaMemset(match_count, 0, 2 * sizeof(std::uint32_t)), "cudaMemset");
-  match<<<blocks(source.size), kThreads>>>(source, target, a.matches.data(), match_count);
-  check_launch("match");
-  sample<<<blocks(o.count), kThreads>>>(a.matches.data(), match_count, o.count, options_.seed,
-                                        o.edge_similarity * o.edge_similarity, a.survivors.data(),
-                                        match_count + 1);
-  check_launch("sample");
+  const cudaStream_t stream{};
+  launch(stream, "match", match, {blocks(source.size), kThreads}, source, target, a.matches.data(),
+         match_count);
+  launch(stream, "sample", sample, {blocks(o.count), kThreads}, a.matches.data(), match_count,
+         o.count, options_.seed, o.edge_similarity * o.edge_similarity, a.survivors.data(),
+         match_count + 1);
   NaiveResult result{};
   check(
       cudaMemcpy(&result.survivors, match_count + 1, sizeof(std::uint32_t), cudaMemcpyDeviceToHost),
       "cudaMemcpy");
   if (result.survivors == 0) return result;
-  fit<<<blocks(result.survivors), kThreads>>>(a.matches.data(), match_count, a.survivors.data(),
-                                              result.survivors, options_.seed, a.poses.data(),
-                                              a.valid.data());
-  check_launch("fit");
-  score<<<result.survivors, kThreads>>>(source, target,
-                                        inlier_test(options_.prepare.max_correspondence_distance,
-                                                    options_.quadruples.max_normal_angle),
-                                        a.poses.data(), a.valid.data(), a.survivors.data(),
-                                        a.supports.data());
-  check_launch("score");
+  launch(stream, "fit", fit, {blocks(result.survivors), kThreads}, a.matches.data(), match_count,
+         a.survivors.data(), result.survivors, options_.seed, a.poses.data(), a.valid.data());
+  launch(stream, "score", score, {result.survivors, kThreads}, source, target,
+         inlier_test(options_.prepare.max_correspondence_distance,
+                     options_.quadruples.max_normal_angle),
+         a.poses.data(), a.valid.data(), a.survivors.data(), a.supports.data());
   supports_.resize(result.survivors);
   check(cudaMemcpy(supports_.data(), a.supports.data(), result.survivors * sizeof(Support),
                    cudaMemcpyDeviceToHost),

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "cuda/common/engine.hpp"
+#include "cuda/device/launch.cuh"
 #include "gpureg/error.hpp"
 
 namespace gpureg::cuda {
@@ -112,9 +113,8 @@ void Adopted::take() {
     if (floats == 0) continue;
     part.bytes = floats * sizeof(float);
     part.to = static_cast<float*>(memory_->allocate(part.bytes, part.stream));
-    pack_rows<<<blocks_for(floats, 256), 256, 0, part.stream>>>(part.from, part.stride, part.width,
-                                                                raw.size, part.to);
-    check_launch("pack_rows");
+    launch(part.stream, "pack_rows", pack_rows, {blocks_for(floats, 256), 256}, part.from,
+           part.stride, part.width, raw.size, part.to);
     // A thread that waits for it sleeps.
     check(cudaEventCreateWithFlags(&part.written, cudaEventDisableTiming | cudaEventBlockingSync),
           "cudaEventCreateWithFlags");

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "algorithm/cell.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -165,9 +166,8 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
   }
   const unsigned entries = static_cast<unsigned>(queries.size());
   if (k > 1) {
-    nearest_many<<<dim3(blocks_for(most_queries, 4), entries), 128, 0, exec.stream()>>>(
-        batch.data(), k, out.data());
-    check_launch("nearest_many");
+    launch(exec, "nearest_many", nearest_many, {{blocks_for(most_queries, 4), entries}, 128},
+           batch.data(), k, out.data());
     return out;
   }
   // All bits set is greater than every result, and its index is kNoValue.
@@ -182,14 +182,13 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
   } else {
     const std::uint32_t rows_per_part = rows_of_part(
         exec, blocks_for(most_queries, kQueries) * std::size_t(entries), most_rows, kRows);
-    nearest_one<<<dim3(blocks_for(most_queries, kQueries), blocks_for(most_rows, rows_per_part),
-                       entries),
-                  kThreads, 0, exec.stream()>>>(batch.data(), rows_per_part, best.data());
-    check_launch("nearest_one");
+    launch(exec, "nearest_one", nearest_one,
+           {{blocks_for(most_queries, kQueries), blocks_for(most_rows, rows_per_part), entries},
+            kThreads},
+           batch.data(), rows_per_part, best.data());
   }
-  unpack_nearest<<<dim3(blocks_for(most_queries, 256), entries), 256, 0, exec.stream()>>>(
-      batch.data(), best.data(), out.data());
-  check_launch("unpack_nearest");
+  launch(exec, "unpack_nearest", unpack_nearest, {{blocks_for(most_queries, 256), entries}, 256},
+         batch.data(), best.data(), out.data());
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "cuda/common/nearest_feature.hpp"
+#include "cuda/device/launch.cuh"
 
 // Exact nearest features at the speed of the tensor cores. |q - r|^2 = |q|^2 + |r|^2 - 2 q.r; a
 // term of q and a term of r bound the error of rounding q and r to binary16 (product_error()). A
@@ -300,11 +301,9 @@ void run(Exec& exec, unsigned entries, std::uint32_t most_queries, std::uint32_t
     return dim3(query_blocks, blocks_for(blocks_for(rows, kRows), batch.tiles_per_part), entries);
   };
   const dim3 some = grid(kStep);
-  filter<kSteps, kWidth, kCopy, false><<<some, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("filter, bounds");
+  launch(exec, "filter, bounds", filter<kSteps, kWidth, kCopy, false>, {some, kThreads}, batch);
   const dim3 all = grid(1);
-  filter<kSteps, kWidth, kCopy, true><<<all, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("filter, candidates");
+  launch(exec, "filter, candidates", filter<kSteps, kWidth, kCopy, true>, {all, kThreads}, batch);
 }
 
 }  // namespace

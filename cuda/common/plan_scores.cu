@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "cuda/common/plan_matcher.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -171,32 +172,29 @@ void count_cells(Exec& exec, const Map& map, const Scan* scans, std::size_t most
                  const HeadingTask* tasks, std::size_t size, const std::int32_t* least,
                  unsigned long long* counts) {
   in_parts(tasks, size, most_words, [&](dim3 grid, const HeadingTask* some) {
-    count<<<grid, kThreads, 0, exec.stream()>>>(map, scans, some, least, counts);
-    check_launch("count_cells");
+    launch(exec, "count_cells", count, {grid, kThreads}, map, scans, some, least, counts);
   });
 }
 
 void raise_least(Exec& exec, const unsigned long long* counts, std::size_t scans, std::size_t most,
                  std::int32_t* least) {
-  raise<<<blocks_for(scans, kThreads), kThreads, 0, exec.stream()>>>(counts, scans, most, least);
-  check_launch("raise_least");
+  launch(exec, "raise_least", raise, {blocks_for(scans, kThreads), kThreads}, counts, scans, most,
+         least);
 }
 
 void list_cells(Exec& exec, const Map& map, const Scan* scans, std::size_t most_words,
                 const HeadingTask* tasks, std::size_t size, const std::int32_t* least,
                 std::size_t most, std::uint32_t* found, CellKey* cells) {
   in_parts(tasks, size, most_words, [&](dim3 grid, const HeadingTask* some) {
-    list<<<grid, kThreads, 0, exec.stream()>>>(map, scans, some, least, most, found, cells);
-    check_launch("list_cells");
+    launch(exec, "list_cells", list, {grid, kThreads}, map, scans, some, least, most, found, cells);
   });
 }
 
 void refine_places(Exec& exec, const Map& map, const Scan* scans, const RefineTask* tasks,
                    std::size_t count, Place* refined) {
   if (count == 0) return;
-  refine<<<static_cast<unsigned>(count), kRefineThreads, 0, exec.stream()>>>(map, scans, tasks,
-                                                                             refined);
-  check_launch("refine_places");
+  launch(exec, "refine_places", refine, {static_cast<unsigned>(count), kRefineThreads}, map, scans,
+         tasks, refined);
 }
 
 }  // namespace gpureg::cuda

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "algorithm/closest_build.hpp"
@@ -9,6 +10,7 @@
 #include "algorithm/grid.hpp"
 #include "algorithm/moments.hpp"
 #include "algorithm/quadruple.hpp"
+#include "cuda/device/cell_range.hpp"
 #include "cuda/device/segments.hpp"
 #include "pipeline/engine.hpp"
 #include "pipeline/runs.hpp"
@@ -16,10 +18,6 @@
 /// Data between the CUDA stages: arrays on the device, one for the whole batch, and metadata on the
 /// host.
 namespace gpureg::cuda {
-
-struct CellRange {
-  Cell lo, hi;
-};
 
 /// Metadata of one cloud on the host.
 struct CloudFacts {
@@ -241,50 +239,50 @@ struct MatchRow {
   float4 normals[2];  ///< m.xyz n.x, n.yz, unused
 };
 
-/// Matches of a batch for the candidates, in device memory; see cpu::MatchSet.
-struct MatchSetView {
-  const float *px, *py, *pz, *qx, *qy, *qz;  ///< local points of source and target
-  const float *mx, *my, *mz, *nx, *ny, *nz;  ///< their normals
-  const std::uint32_t *source, *target;      ///< their indices
+/// Matches of a batch in device memory, a column for each value; see cpu::MatchSet. Real, Integer:
+/// constant for those who read.
+template <typename Real, typename Integer>
+struct MatchColumns {
+  static constexpr std::size_t kReals = 12, kIntegers = 4;
+  Real *px, *py, *pz, *qx, *qy, *qz;  ///< local points of source and target
+  Real *mx, *my, *mz, *nx, *ny, *nz;  ///< their normals
+  Integer *source, *target;           ///< their indices
   /// Normal-space weights over the matches of the pair.
-  const std::uint32_t *source_weight, *target_weight;
+  Integer *source_weight, *target_weight;
+
+  /// Columns of n values, one after the other.
+  void set(Real* reals, Integer* integers, std::size_t n) {
+    Real** const of_reals[kReals] = {&px, &py, &pz, &qx, &qy, &qz, &mx, &my, &mz, &nx, &ny, &nz};
+    for (Real** column : of_reals) *column = std::exchange(reals, reals + n);
+    Integer** const of_integers[kIntegers] = {&source, &target, &source_weight, &target_weight};
+    for (Integer** column : of_integers) *column = std::exchange(integers, integers + n);
+  }
+};
+
+struct MatchSetView : MatchColumns<const float, const std::uint32_t> {
   const MatchRow* rows;  ///< the same for access in any order
 };
 
 struct MatchSets {
-  static constexpr int kColumns = 16;
+  using Columns = MatchColumns<float, std::uint32_t>;
   /// where each pair's matches lie; as many as there could be
   Segments room;
-  /// the arrays of a MatchSetView one after the other, each as long as the room for all pairs
-  DeviceBuffer<std::uint32_t> columns;
+  /// of Columns, each as long as the room for all pairs
+  DeviceBuffer<float> reals;
+  DeviceBuffer<std::uint32_t> integers;
   DeviceBuffer<MatchRow> rows;
   DeviceBuffer<std::uint32_t> count;  ///< per pair
   /// per pair: weight of all source points, of all target points
   DeviceBuffer<std::uint64_t> total;
 
+  Columns columns() const {
+    Columns columns;
+    columns.set(reals.data(), integers.data(), room.total());
+    return columns;
+  }
   MatchSetView view() const {
-    const std::size_t n = room.total();
-    const std::uint32_t* c = columns.data();
-    const auto real = [&](int k) {
-      return reinterpret_cast<const float*>(c + static_cast<std::size_t>(k) * n);
-    };
-    MatchSetView view{};
-    view.px = real(0);
-    view.py = real(1);
-    view.pz = real(2);
-    view.qx = real(3);
-    view.qy = real(4);
-    view.qz = real(5);
-    view.mx = real(6);
-    view.my = real(7);
-    view.mz = real(8);
-    view.nx = real(9);
-    view.ny = real(10);
-    view.nz = real(11);
-    view.source = c + 12 * n;
-    view.target = c + 13 * n;
-    view.source_weight = c + 14 * n;
-    view.target_weight = c + 15 * n;
+    MatchSetView view;
+    view.set(reals.data(), integers.data(), room.total());
     view.rows = rows.data();
     return view;
   }

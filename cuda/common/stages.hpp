@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "confidence/degeneracy_search.hpp"
 #include "cuda/common/stage_data.hpp"
 #include "cuda/device/exec.hpp"
 
@@ -74,9 +75,11 @@ void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options, f
 /// Drops perturbed poses that have returned to their origin mode or to an earlier one of them.
 void drop_returned(Exec& exec, Modes& perturbed, const std::vector<PosesOfPair>& perturbations);
 /// Perturbed poses of the most likely mode of each pair; on the host.
-std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
-                                             Span<const PairOutcome> outcomes,
-                                             const RegistrationOptions& options);
+inline std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
+                                                    Span<const PairOutcome> outcomes,
+                                                    const RegistrationOptions& options) {
+  return confidence::search_degeneracies(inputs, outcomes, options, exec.host_threads());
+}
 Modes modes_from_poses(Exec& exec, const std::vector<PosesOfPair>& poses);
 /// For poses that were not proposed by the stages before.
 Candidates no_candidates(Exec& exec, Span<const PairView> pairs);

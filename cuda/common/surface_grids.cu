@@ -3,6 +3,7 @@
 
 #include "cuda/device/group_by_cell.cuh"
 #include "cuda/device/hash_table.cuh"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -101,10 +102,11 @@ SurfaceGrids build_surface_grids(Exec& exec, Span<const SurfaceArrays> on_host,
                    table_offset_on_device.data(),
                    out.points.data(),
                    out.normals.data()};
-  fill_surface_grids<<<dim3(std::max(1u, std::min(blocks_for(segments.largest, kThreads), 1024u)),
-                            static_cast<unsigned>(count)),
-                       kThreads, 0, exec.stream()>>>(batch);
-  check_launch("fill_surface_grids");
+  launch(exec, "fill_surface_grids", fill_surface_grids,
+         {{std::max(1u, std::min(blocks_for(segments.largest, kThreads), 1024u)),
+           static_cast<unsigned>(count)},
+          kThreads},
+         batch);
   return out;
 }
 

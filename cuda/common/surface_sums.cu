@@ -3,6 +3,7 @@
 
 #include "cuda/common/surface_grids.hpp"
 #include "cuda/device/block_sum.cuh"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -63,9 +64,10 @@ void add_up_surfaces(Exec& exec, const SurfaceArrays* surfaces, const SurfaceGri
     const std::size_t size = std::min(kMaxPairsPerLaunch, count - begin);
     const AddUp batch{surfaces, grids.views.data(), first_target, pairs + begin,
                       terms,    sums + begin};
-    add_up<<<dim3(blocks_for(points, kThreads * kPointsPerThread), static_cast<unsigned>(size)),
-             kThreads, 0, exec.stream()>>>(batch);
-    check_launch("add_up");
+    launch(
+        exec, "add_up", add_up,
+        {{blocks_for(points, kThreads * kPointsPerThread), static_cast<unsigned>(size)}, kThreads},
+        batch);
   }
 }
 

@@ -4,6 +4,7 @@
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/match_set.cuh"
 #include "cuda/device/device_algorithms.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -174,29 +175,25 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
   const std::uint32_t row_blocks = blocks_for(largest, kBlockRows),
                       columns = std::min(largest, kDegreeSample);
   batch.columns = items_per_block(exec, row_blocks * pairs, columns, kBlockColumns, kTile);
-  count_compatible<<<dim3(row_blocks, blocks_for(columns, batch.columns), pair_count), kThreads, 0,
-                     exec.stream()>>>(batch);
-  check_launch("count_compatible");
+  launch(exec, "count_compatible", count_compatible,
+         {{row_blocks, blocks_for(columns, batch.columns), pair_count}, kThreads}, batch);
   auto key = exec.buffer<std::uint64_t>(total);
   auto match = exec.buffer<std::uint32_t>(total);
   const auto ranked = exec.buffer<float4>(total);
   const dim3 grid(blocks_for(largest, 256), pair_count);
-  write_degree_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
-  check_launch("write_degree_keys");
+  launch(exec, "write_degree_keys", write_degree_keys, {grid, 256}, batch, key.data(),
+         match.data());
   sort_segments(exec, key, match, matches.room, kDegreeBits);
-  rank_points<<<grid, 256, 0, exec.stream()>>>(batch, match.data(), ranked.data());
-  check_launch("rank_points");
+  launch(exec, "rank_points", rank_points, {grid, 256}, batch, match.data(), ranked.data());
   // Its warps work by themselves; where they are few, four take the place of one.
   const std::uint32_t threads = items_per_block(exec, pairs, largest, kThreads, 32);
-  find_slopes<<<dim3(blocks_for(largest, threads), pair_count, threads == 32 ? 4 : 1), threads, 0,
-                exec.stream()>>>(batch, ranked.data(), match.data());
-  check_launch("find_slopes");
-  write_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
-  check_launch("write_keys");
+  launch(exec, "find_slopes", find_slopes,
+         {{blocks_for(largest, threads), pair_count, threads == 32 ? 4u : 1u}, threads}, batch,
+         ranked.data(), match.data());
+  launch(exec, "write_keys", write_keys, {grid, 256}, batch, key.data(), match.data());
   sort_segments(exec, key, match, matches.room, kStrengthBits + 1);
-  take_seeds<<<dim3(blocks_for(out.most, 256), pair_count), 256, 0, exec.stream()>>>(
-      batch, match.data(), out.most, out.match.data(), out.count.data());
-  check_launch("take_seeds");
+  launch(exec, "take_seeds", take_seeds, {{blocks_for(out.most, 256), pair_count}, 256}, batch,
+         match.data(), out.most, out.match.data(), out.count.data());
   return out;
 }
 

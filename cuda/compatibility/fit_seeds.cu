@@ -6,6 +6,8 @@
 #include "algorithm/fit.hpp"
 #include "cuda/compatibility/match_set.cuh"
 #include "cuda/compatibility/neighborhoods.hpp"
+#include "cuda/device/launch.cuh"
+#include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -106,11 +108,7 @@ __device__ std::uint32_t list_members(const SeedFits& b, std::uint32_t p, std::u
     std::uint32_t word = w < words ? bits[w] : 0;
     if (w == seed / 32) word &= ~(1u << seed % 32);
     const std::uint32_t own = static_cast<std::uint32_t>(__popc(static_cast<int>(word)));
-    std::uint32_t before = own;
-    for (int step = 1; step < 32; step *= 2) {
-      const std::uint32_t other = __shfl_up_sync(~0u, before, static_cast<unsigned>(step));
-      if (lane >= static_cast<std::uint32_t>(step)) before += other;
-    }
+    std::uint32_t before = warp_prefix_sum(own);
     if (lane == 31) warp_count[warp] = before;
     before += size - own;
     __syncthreads();
@@ -352,17 +350,15 @@ SeedPoses fit_seeds(Exec& exec, const MatchSets& matches, const Seeds& seeds,
   const unsigned pair_count = static_cast<unsigned>(pairs);
   const dim3 block_each(most_seeds, pair_count),
       thread_each(blocks_for(most_seeds, kThreads), pair_count);
-  choose_triangles<<<block_each, kThreads, o.max_members * sizeof(Member), exec.stream()>>>(batch);
-  check_launch("choose_triangles");
-  fit_triangles<<<thread_each, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("fit_triangles");
+  launch(exec, "choose_triangles", choose_triangles,
+         {block_each, kThreads, o.max_members * sizeof(Member)}, batch);
+  launch(exec, "fit_triangles", fit_triangles, {thread_each, kThreads}, batch);
   for (std::uint32_t k = 0; k < o.refits; ++k) {
-    sum_consensus<<<block_each, kThreads,
-                    o.max_members*(kCentroids * sizeof(float) + sizeof(std::uint32_t)),
-                    exec.stream()>>>(batch);
-    check_launch("sum_consensus");
-    refit<<<thread_each, kThreads, 0, exec.stream()>>>(batch);
-    check_launch("refit");
+    launch(exec, "sum_consensus", sum_consensus,
+           {block_each, kThreads,
+            o.max_members * (kCentroids * sizeof(float) + sizeof(std::uint32_t))},
+           batch);
+    launch(exec, "refit", refit, {thread_each, kThreads}, batch);
   }
   return out;
 }

@@ -11,6 +11,7 @@
 #include "cuda/compatibility/sort_matches.hpp"
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/entry_of.cuh"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -49,7 +50,7 @@ struct MergeBatch {
   std::uint32_t* found;  // per pair
   std::uint32_t* bins;   // per pair: source, target
   const std::uint32_t* room;
-  std::uint32_t* column[MatchSets::kColumns];
+  MatchSets::Columns columns;
   MatchRow* rows;
   std::uint32_t* count;
   std::uint64_t* total;
@@ -134,19 +135,25 @@ __global__ void __launch_bounds__(kThreads) gather_matches(MergeBatch b) {
       }
       if (before == k - begin) m = one;
     }
-    const Vec3 v[4] = {s.points[m.source], t.points[m.target], s.normals[m.source],
-                       t.normals[m.target]};
     const std::size_t at = b.room[p] + k;
-    for (int c = 0; c < 4; ++c) {
-      b.column[3 * c][at] = __float_as_uint(v[c].x);
-      b.column[3 * c + 1][at] = __float_as_uint(v[c].y);
-      b.column[3 * c + 2][at] = __float_as_uint(v[c].z);
-    }
-    const std::uint32_t source_bin = normal_bin(v[2]), target_bin = normal_bin(v[3]);
-    b.column[12][at] = m.source;
-    b.column[13][at] = m.target;
-    b.column[14][at] = source_bin;
-    b.column[15][at] = target_bin;
+    const auto set = [&](float* x, float* y, float* z, Vec3 value) {
+      x[at] = value.x;
+      y[at] = value.y;
+      z[at] = value.z;
+    };
+    const Vec3 source_point = s.points[m.source], target_point = t.points[m.target],
+               source_normal = s.normals[m.source], target_normal = t.normals[m.target];
+    const MatchSets::Columns& to = b.columns;
+    set(to.px, to.py, to.pz, source_point);
+    set(to.qx, to.qy, to.qz, target_point);
+    set(to.mx, to.my, to.mz, source_normal);
+    set(to.nx, to.ny, to.nz, target_normal);
+    const std::uint32_t source_bin = normal_bin(source_normal),
+                        target_bin = normal_bin(target_normal);
+    to.source[at] = m.source;
+    to.target[at] = m.target;
+    to.source_weight[at] = source_bin;
+    to.target_weight[at] = target_bin;
     atomicAdd(bins + source_bin, 1u);
     atomicAdd(bins + kNormalBins + target_bin, 1u);
   }
@@ -164,16 +171,17 @@ __global__ void __launch_bounds__(kThreads) weight_matches_by_normals(MergeBatch
   __syncthreads();
   const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x;
   if (k < count) {
-    std::uint32_t& source = b.column[14][b.room[p] + k];
-    std::uint32_t& target = b.column[15][b.room[p] + k];
-    source = weight[source];
-    target = weight[kNormalBins + target];
-    const auto real = [&](int c) { return __uint_as_float(b.column[c][b.room[p] + k]); };
-    MatchRow& row = b.rows[b.room[p] + k];
-    row.points[0] = make_float4(real(0), real(1), real(2), real(3));
-    row.points[1] = make_float4(real(4), real(5), __uint_as_float(source + target), 0.0f);
-    row.normals[0] = make_float4(real(6), real(7), real(8), real(9));
-    row.normals[1] = make_float4(real(10), real(11), 0.0f, 0.0f);
+    const std::uint32_t at = b.room[p] + k;
+    const MatchSets::Columns& m = b.columns;
+    const std::uint32_t source = weight[m.source_weight[at]],
+                        target = weight[kNormalBins + m.target_weight[at]];
+    m.source_weight[at] = source;
+    m.target_weight[at] = target;
+    MatchRow& row = b.rows[at];
+    row.points[0] = make_float4(m.px[at], m.py[at], m.pz[at], m.qx[at]);
+    row.points[1] = make_float4(m.qy[at], m.qz[at], __uint_as_float(source + target), 0.0f);
+    row.normals[0] = make_float4(m.mx[at], m.my[at], m.mz[at], m.nx[at]);
+    row.normals[1] = make_float4(m.ny[at], m.nz[at], 0.0f, 0.0f);
   }
   if (k != 0) return;
   b.count[p] = count;
@@ -241,10 +249,9 @@ Answers search(Exec& exec, Span<const PairView> pairs, const RegistrationOptions
   out.rows = exec.buffer<std::uint32_t>(at);
   const auto samples_on_device = exec.upload(samples);
   const auto offset_on_device = exec.upload(offset);
-  write_query_rows<<<dim3(blocks_for(largest, kThreads), static_cast<unsigned>(samples.size())),
-                     kThreads, 0, exec.stream()>>>(samples_on_device.data(),
-                                                   offset_on_device.data(), out.rows.data());
-  check_launch("write_query_rows");
+  launch(exec, "write_query_rows", write_query_rows,
+         {{blocks_for(largest, kThreads), static_cast<unsigned>(samples.size())}, kThreads},
+         samples_on_device.data(), offset_on_device.data(), out.rows.data());
   for (std::size_t k = 0; k < queries.size(); ++k)
     queries[k].query_row = out.rows.data() + offset[k];
   out.nearest = nearest_features(exec, queries, 1, static_cast<std::size_t>(at));
@@ -282,8 +289,10 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
   out.room = make_segments(exec, pairs.size, [&](std::size_t p) {
     return std::min(entries[p].answers, options.compatibility.max_matches);
   });
-  out.columns = exec.buffer<std::uint32_t>(std::size_t(out.room.total()) * MatchSets::kColumns);
-  out.rows = exec.buffer<MatchRow>(out.room.total());
+  const std::size_t room = out.room.total();
+  out.reals = exec.buffer<float>(room * MatchSets::Columns::kReals);
+  out.integers = exec.buffer<std::uint32_t>(room * MatchSets::Columns::kIntegers);
+  out.rows = exec.buffer<MatchRow>(room);
   out.count = exec.filled<std::uint32_t>(pairs.size, 0);
   out.total = exec.filled<std::uint64_t>(2 * pairs.size, 0);
   if (answer_segments.total() == 0) return out;
@@ -305,15 +314,13 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
   batch.found = found.data();
   batch.bins = bins.data();
   batch.room = out.room.on_device.data();
-  for (int c = 0; c < MatchSets::kColumns; ++c)
-    batch.column[c] = out.columns.data() + std::size_t(c) * out.room.total();
+  batch.columns = out.columns();
   batch.rows = out.rows.data();
   batch.count = out.count.data();
   batch.total = out.total.data();
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
-  order_matches<<<dim3(blocks_for(answer_segments.largest, kThreads), pair_count), kThreads, 0,
-                  exec.stream()>>>(batch);
-  check_launch("order_matches");
+  launch(exec, "order_matches", order_matches,
+         {{blocks_for(answer_segments.largest, kThreads), pair_count}, kThreads}, batch);
   if (!sort_matches(exec, answer_segments, found.data(), key.data(), answer.data())) {
     constexpr int kOrderBits = 32 + 1;  // order of the match, whether it is dropped
     sort_pairs(exec, key, answer, kOrderBits + bits_for(pairs.size));
@@ -321,10 +328,8 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
     batch.answer = answer.data();
   }
   const dim3 grid(blocks_for(out.room.largest, kThreads), pair_count);
-  gather_matches<<<grid, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("gather_matches");
-  weight_matches_by_normals<<<grid, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("weight_matches_by_normals");
+  launch(exec, "gather_matches", gather_matches, {grid, kThreads}, batch);
+  launch(exec, "weight_matches_by_normals", weight_matches_by_normals, {grid, kThreads}, batch);
   return out;
 }
 

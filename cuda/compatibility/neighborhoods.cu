@@ -3,6 +3,7 @@
 
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/match_set.cuh"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -55,13 +56,12 @@ Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const See
   out.words = (largest + 31) / 32;
   out.bits = exec.buffer<std::uint32_t>(pairs * seeds.most * out.words);
   if (largest == 0) return out;
-  find_compatible<<<dim3(blocks_for(largest, kThreads * kColumns),
-                         blocks_for(std::min(seeds.most, largest), kSeeds),
-                         static_cast<unsigned>(pairs)),
-                    kThreads, 0, exec.stream()>>>(
-      matches.view(), matches.room.on_device.data(), matches.count.data(), seeds.match.data(),
-      seeds.count.data(), seeds.most, test_of(options), out.words, out.bits.data());
-  check_launch("find_compatible");
+  launch(exec, "find_compatible", find_compatible,
+         {{blocks_for(largest, kThreads * kColumns),
+           blocks_for(std::min(seeds.most, largest), kSeeds), static_cast<unsigned>(pairs)},
+          kThreads},
+         matches.view(), matches.room.on_device.data(), matches.count.data(), seeds.match.data(),
+         seeds.count.data(), seeds.most, test_of(options), out.words, out.bits.data());
   return out;
 }
 

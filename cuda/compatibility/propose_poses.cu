@@ -4,6 +4,7 @@
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/fit_seeds.hpp"
 #include "cuda/compatibility/match_set.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
@@ -105,21 +106,19 @@ Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seed
   const std::uint32_t largest = matches.room.largest;
   if (largest == 0) return out;
   const SeedPoses found = fit_seeds(exec, matches, seeds, options);
-  keep_valid<<<pair_count, kThreads, 0, exec.stream()>>>(
-      seeds.count.data(), seeds.match.data(), found.valid.data(), found.pose.data(), seeds.most,
-      out.pose.data(), out.seed.data(), out.matches.data(), out.count.data());
-  check_launch("keep_valid");
+  launch(exec, "keep_valid", keep_valid, {pair_count, kThreads}, seeds.count.data(),
+         seeds.match.data(), found.valid.data(), found.pose.data(), seeds.most, out.pose.data(),
+         out.seed.data(), out.matches.data(), out.count.data());
   const std::uint32_t most_seeds = std::min(seeds.most, largest);
   const float squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
   const std::uint32_t candidate_blocks = blocks_for(most_seeds, kThreads),
                       per_block = items_per_block(exec, candidate_blocks * pairs, largest,
                                                   kMatchesPerBlock, kTile);
-  count_matches<<<dim3(candidate_blocks, pair_count, blocks_for(largest, per_block)), kThreads, 0,
-                  exec.stream()>>>(matches.view(), matches.room.on_device.data(),
-                                   matches.count.data(), per_block, out.most, out.count.data(),
-                                   squared_distance, out.pose.data(), out.matches.data());
-  check_launch("count_matches");
+  launch(exec, "count_matches", count_matches,
+         {{candidate_blocks, pair_count, blocks_for(largest, per_block)}, kThreads}, matches.view(),
+         matches.room.on_device.data(), matches.count.data(), per_block, out.most, out.count.data(),
+         squared_distance, out.pose.data(), out.matches.data());
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include "algorithm/evidence.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/sampled_pairs.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -288,10 +289,8 @@ void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes,
     refine_by_clusters(exec, batch, pair_count);
   } else {
     const bool few = count < processors * 2;
-    (few ? refine<1024, 1>
-         : refine<256, 1, kSmallResident>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0,
-                                             exec.stream()>>>(batch);
-    check_launch("refine");
+    launch(exec, "refine", (few ? refine<1024, 1> : refine<256, 1, kSmallResident>),
+           {{modes.most, pair_count}, few ? 1024u : 256u}, batch);
   }
 }
 
@@ -313,19 +312,16 @@ void polish_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
 
 void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options, float share) {
   const unsigned pairs = static_cast<unsigned>(modes.count.size());
-  merge<<<pairs, 32, 0, exec.stream()>>>(
-      modes.most, modes.mode.data(), modes.count.data(),
-      mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, share));
-  check_launch("merge");
+  launch(exec, "merge", merge, {pairs, 32}, modes.most, modes.mode.data(), modes.count.data(),
+         mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, share));
 }
 
 void drop_returned(Exec& exec, Modes& perturbed, const std::vector<PosesOfPair>& perturbations) {
   std::vector<ReturnTest> tests(perturbations.size());
   for (std::size_t p = 0; p < tests.size(); ++p) tests[p] = perturbations[p].returned;
   const auto on_device = exec.upload(tests);
-  drop<<<static_cast<unsigned>(tests.size()), 32, 0, exec.stream()>>>(
-      perturbed.most, on_device.data(), perturbed.mode.data(), perturbed.count.data());
-  check_launch("drop");
+  launch(exec, "drop", drop, {static_cast<unsigned>(tests.size()), 32}, perturbed.most,
+         on_device.data(), perturbed.mode.data(), perturbed.count.data());
 }
 
 Modes modes_from_poses(Exec& exec, const std::vector<PosesOfPair>& poses) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "algorithm/evidence.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -74,11 +75,10 @@ SampledPairs sample_pairs(Exec& exec, Span<const PairView> pairs, std::uint32_t 
   }
   out.pairs = exec.upload(sampled);
   if (largest == 0) return out;
-  copy_sample<<<dim3(blocks_for(largest, kThreads), static_cast<unsigned>(pairs.size),
-                     both ? 2 : 1),
-                kThreads, 0, exec.stream()>>>(out.pairs.data(), most, out.rows.data(),
-                                              out.weight.data());
-  check_launch("copy_sample");
+  launch(exec, "copy_sample", copy_sample,
+         {{blocks_for(largest, kThreads), static_cast<unsigned>(pairs.size), both ? 2u : 1u},
+          kThreads},
+         out.pairs.data(), most, out.rows.data(), out.weight.data());
   return out;
 }
 

@@ -5,7 +5,9 @@
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/compare_point.cuh"
 #include "cuda/compatibility/sampled_pairs.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
+#include "pipeline/evidence_test.hpp"
 
 namespace gpureg::cuda {
 namespace {
@@ -54,12 +56,6 @@ __device__ SideEvidence sum_for_score(SideEvidence a, const SideEvidence& b) {
   return a;
 }
 
-__device__ float smaller_share(const MatchEvidence& m, const std::uint64_t* total) {
-  const float s = static_cast<float>(m.source_weight) / static_cast<float>(total[0]);
-  const float t = static_cast<float>(m.target_weight) / static_cast<float>(total[1]);
-  return s < t ? s : t;
-}
-
 /// kEach warps per candidate: one, or all of a thread block.
 template <int kEach>
 __global__ void __launch_bounds__(32 * std::max(kEach, kWarps), kEach > 1 ? 4 : kBlocks)
@@ -94,7 +90,7 @@ __global__ void __launch_bounds__(32 * std::max(kEach, kWarps), kEach > 1 ? 4 : 
   }
   if (threadIdx.x % 32 == 0)
     out[at] =
-        coarse_score(smaller_share(matches[at], match_total + 2 * p), a,
+        coarse_score(smaller_share(matches[at], match_total[2 * p], match_total[2 * p + 1]), a,
                      static_cast<float>(weight[2 * p]), b, static_cast<float>(weight[2 * p + 1]));
 }
 
@@ -107,21 +103,17 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& m
   const SampledPairs sampled = sample_pairs(exec, pairs, options.evidence.sample, true);
   const auto weight = exec.buffer<unsigned long long>(2 * pairs.size);
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
-  sampled_weight<<<dim3(pair_count, 2), 256, 0, exec.stream()>>>(sampled.pairs.data(),
-                                                                 weight.data());
-  check_launch("sampled_weight");
-  const EvidenceTest test{
-      inlier_test(options.prepare.max_correspondence_distance, options.evidence.max_normal_angle),
-      options.evidence.free_space_margin, options.evidence.min_range};
+  launch(exec, "sampled_weight", sampled_weight, {{pair_count, 2}, 256}, sampled.pairs.data(),
+         weight.data());
+  const EvidenceTest test = pipeline::evidence_test(options);
   const bool together =
       std::size_t(most) * pairs.size < 16 * static_cast<std::size_t>(exec.multiprocessors());
-  (together ? score<kTogether>
-            : score<1>)<<<dim3(together ? most : blocks_for(most, kWarps), pair_count),
-                          32 * (together ? kTogether : kWarps), 0, exec.stream()>>>(
-      sampled.pairs.data(), matches.total.data(), weight.data(), candidates.most,
-      candidates.count.data(), candidates.pose.data(), candidates.matches.data(), test,
-      candidates.coarse_score.data());
-  check_launch("score");
+  launch(exec, "score", (together ? score<kTogether> : score<1>),
+         {{together ? most : blocks_for(most, kWarps), pair_count},
+          32u * (together ? kTogether : kWarps)},
+         sampled.pairs.data(), matches.total.data(), weight.data(), candidates.most,
+         candidates.count.data(), candidates.pose.data(), candidates.matches.data(), test,
+         candidates.coarse_score.data());
 }
 
 }  // namespace gpureg::cuda

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/evidence.hpp"
 #include "cuda/common/stages.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -61,12 +62,11 @@ Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationO
   out.mode = exec.buffer<Mode>(pairs * out.most);
   out.count = exec.buffer<std::uint32_t>(pairs);
   const unsigned threads = candidates.most > kThreads / 2 ? kThreads : kFewThreads;
-  select<<<static_cast<unsigned>(pairs), threads, 0, exec.stream()>>>(
-      candidates.most, candidates.count.data(), candidates.pose.data(),
-      candidates.coarse_score.data(), candidates.seed.data(),
-      mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, 1.0f), out.most,
-      out.mode.data(), out.count.data());
-  check_launch("select");
+  launch(exec, "select", select, {static_cast<unsigned>(pairs), threads}, candidates.most,
+         candidates.count.data(), candidates.pose.data(), candidates.coarse_score.data(),
+         candidates.seed.data(),
+         mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, 1.0f), out.most,
+         out.mode.data(), out.count.data());
   return out;
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/compatibility/sort_matches.hpp"
+#include "cuda/device/launch.cuh"
+#include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -41,11 +43,7 @@ __global__ void __launch_bounds__(kSortThreads) sort_by_buckets(SortBatch b) {
   std::uint32_t count[4], mine = 0;
 #pragma unroll
   for (int k = 0; k < 4; ++k) mine += count[k] = start[4 * threadIdx.x + k];
-  std::uint32_t before = mine;
-  for (int step = 1; step < 32; step *= 2) {
-    const std::uint32_t other = __shfl_up_sync(~0u, before, static_cast<unsigned>(step));
-    if (lane >= static_cast<std::uint32_t>(step)) before += other;
-  }
+  std::uint32_t before = warp_prefix_sum(mine);
   if (lane == 31) warp_sum_of[threadIdx.x / 32] = before;
   __syncthreads();
   before -= mine;
@@ -85,9 +83,9 @@ bool sort_matches(Exec& exec, const Segments& segments, const std::uint32_t* fou
   constexpr std::size_t kBytes = kMostSorted * sizeof(std::uint64_t);
   if (segments.largest > kMostSorted || exec.allow_shared_memory(sort_by_buckets) < kBytes)
     return false;
-  sort_by_buckets<<<static_cast<unsigned>(segments.entries()), kSortThreads, kBytes,
-                    exec.stream()>>>(SortBatch{segments.on_device.data(), found, key, place});
-  check_launch("sort_by_buckets");
+  launch(exec, "sort_by_buckets", sort_by_buckets,
+         {static_cast<unsigned>(segments.entries()), kSortThreads, kBytes},
+         SortBatch{segments.on_device.data(), found, key, place});
   return true;
 }
 

@@ -6,7 +6,9 @@
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/compare_point.cuh"
 #include "cuda/device/block_sum.cuh"
+#include "cuda/device/launch.cuh"
 #include "pipeline/conclude.hpp"
+#include "pipeline/evidence_test.hpp"
 
 namespace gpureg::cuda {
 namespace {
@@ -225,10 +227,6 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
   const auto views = upload_search_pairs(exec, pairs);
   // Filled: unused modes are copied too, and parts are added up.
   const auto verified = exec.filled<ModeOutcome>(pairs.size * modes.most, 0);
-  const auto& evidence = options.evidence;
-  const EvidenceTest test{
-      inlier_test(options.prepare.max_correspondence_distance, evidence.max_normal_angle),
-      evidence.free_space_margin, evidence.min_range};
   // Several blocks share a mode where there are too few to fill the device.
   const std::size_t blocks = std::size_t(modes.most) * pairs.size,
                     processors = static_cast<std::size_t>(exec.multiprocessors());
@@ -242,7 +240,7 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
   batch.most = modes.most;
   batch.modes = modes.mode.data();
   batch.count = modes.count.data();
-  batch.test = test;
+  batch.test = pipeline::evidence_test(options);
   batch.squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
   batch.out = verified.data();
@@ -250,13 +248,10 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
     return dim3(modes.most, static_cast<unsigned>(pairs.size), z);
   };
   if (parts > 1) {
-    verify_both<<<grid(2 * parts), kThreads, 0, exec.stream()>>>(batch);
-    check_launch("verify_both");
+    launch(exec, "verify_both", verify_both, {grid(2 * parts), kThreads}, batch);
   } else {
-    verify_target<<<grid(1), kThreads, 0, exec.stream()>>>(batch);
-    check_launch("verify_target");
-    verify_source<<<grid(1), kThreads, 0, exec.stream()>>>(batch);
-    check_launch("verify_source");
+    launch(exec, "verify_target", verify_target, {grid(1), kThreads}, batch);
+    launch(exec, "verify_source", verify_source, {grid(1), kThreads}, batch);
   }
   const ModeOutcome* mode = exec.download(verified.data(), verified.size());
   const std::uint32_t* mode_count = exec.download(modes.count.data(), pairs.size);

@@ -13,7 +13,4 @@ inline void check(cudaError_t error, const char* what) {
   if (error != cudaSuccess) throw_device_error(error, what);
 }
 
-/// After every kernel launch.
-inline void check_launch(const char* kernel) { check(cudaGetLastError(), kernel); }
-
 }  // namespace gpureg::cuda

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "common/in_halves.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 
@@ -82,9 +83,9 @@ void sort_segments(Exec& exec, DeviceBuffer<std::uint64_t>& keys,
   constexpr std::size_t kBytes = sizeof(SortInBlock::TempStorage);
   if (segments.largest > kSortThreads * kItems || exec.allow_shared_memory(sort_in_block) < kBytes)
     return sort_pairs(exec, keys, values, bits + bits_for(segments.entries()));
-  sort_in_block<<<static_cast<unsigned>(segments.entries()), kSortThreads, kBytes, exec.stream()>>>(
-      segments.on_device.data(), bits, keys.data(), values.data());
-  check_launch("sort_in_block");
+  launch(exec, "sort_in_block", sort_in_block,
+         {static_cast<unsigned>(segments.entries()), kSortThreads, kBytes},
+         segments.on_device.data(), bits, keys.data(), values.data());
 }
 
 void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std::uint32_t>& values,

@@ -3,8 +3,10 @@
 
 #include <vector>
 
-#include "cuda/common/stage_data.hpp"
+#include "cuda/device/cell_range.hpp"
 #include "cuda/device/device_algorithms.hpp"
+#include "cuda/device/launch.cuh"
+#include "cuda/device/segments.hpp"
 
 /// Groups the elements of every entry of a batch by cell, with one sort for the whole batch and
 /// keys of only as many bits as the cells need.
@@ -80,9 +82,8 @@ Groups group(Exec& exec, const Segments& segments, const KeyPacking& packing, bo
   auto keys = exec.buffer<Key>(total);
   Groups out;
   out.item = exec.buffer<std::uint32_t>(total);
-  write_keys<<<grid, kThreads, 0, exec.stream()>>>(segments.on_device.data(), packing, cell_of_item,
-                                                   keys.data(), out.item.data());
-  check_launch("write_keys");
+  launch(exec, "write_keys", write_keys<Key, CellOf>, {grid, kThreads}, segments.on_device.data(),
+         packing, cell_of_item, keys.data(), out.item.data());
   if (one_sort) {
     sort_pairs(exec, keys, out.item, packing.bits);
   } else if constexpr (sizeof(Key) == 8) {
@@ -91,9 +92,8 @@ Groups group(Exec& exec, const Segments& segments, const KeyPacking& packing, bo
                           out.item.data() + segments.offset[e], segments.size(e), packing.bits);
   }
   out.rank = exec.buffer<std::uint32_t>(total + 1);
-  mark_heads<<<grid, kThreads, 0, exec.stream()>>>(segments.on_device.data(), packing, keys.data(),
-                                                   out.rank.data());
-  check_launch("mark_heads");
+  launch(exec, "mark_heads", mark_heads<Key>, {grid, kThreads}, segments.on_device.data(), packing,
+         keys.data(), out.rank.data());
   exclusive_sum(exec, out.rank.data(), out.rank.data(), total + 1);
   out.start = exec.buffer<std::uint32_t>(total);
   write_group_starts(exec, total, out);

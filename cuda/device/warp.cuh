@@ -48,4 +48,13 @@ __device__ inline std::int64_t warp_sum(std::int64_t v) {
   return v;
 }
 
+/// Sum of the values of this lane and of the lanes before it. Thread blocks of one dimension.
+__device__ inline std::uint32_t warp_prefix_sum(std::uint32_t v) {
+  for (std::uint32_t step = 1; step < 32; step *= 2) {
+    const std::uint32_t before = __shfl_up_sync(~0u, v, step);
+    if (threadIdx.x % 32 >= step) v += before;
+  }
+  return v;
+}
+
 }  // namespace gpureg::cuda

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <initializer_list>
+#include <type_traits>
 
 #include "algorithm/normal_weight.hpp"
 #include "cuda/common/stages.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 #include "cuda/prepare/feature_aids.hpp"
 #include "cuda/prepare/scoring_data.hpp"
@@ -15,6 +17,13 @@ struct Part {
   const char* from;
   char* to;
   std::size_t bytes;
+};
+
+/// An array in a piece of memory that does not exist yet.
+template <typename T>
+struct Place {
+  std::size_t offset;  ///< bytes
+  T* in(char* memory) const { return reinterpret_cast<T*>(memory + offset); }
 };
 
 __global__ void copy_parts(const Part* parts) {
@@ -149,17 +158,27 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     // First the offsets, then the memory, then the pointers.
     const std::size_t first_part = parts.size();
     std::size_t bytes = 0;
+    const auto reserve = [&](std::size_t more) {
+      const std::size_t at = bytes;
+      bytes += (more + 255) / 256 * 256;
+      return at;
+    };
+    // A part whose place is known before the memory is.
+    const auto copy_to = [&](std::size_t at, const auto* from, std::size_t size) {
+      parts.push_back(
+          {reinterpret_cast<const char*>(from), reinterpret_cast<char*>(at), size * sizeof(*from)});
+    };
     const auto place = [&](const auto* from, std::size_t size) {
-      parts.push_back({reinterpret_cast<const char*>(from), reinterpret_cast<char*>(bytes),
-                       size * sizeof(*from)});
-      bytes += (size * sizeof(*from) + 255) / 256 * 256;
+      const std::size_t at = reserve(size * sizeof(*from));
+      copy_to(at, from, size);
+      return Place<std::remove_pointer_t<decltype(from)>>{at};
     };
     const std::size_t begin = segments.offset[c], n = cloud->size;
     const ClosestGridSize& grid_size = closest.size[c];
     const ScoringLayout layout = scoring_layout(cloud->size, grid_size, closest.block_range[c]);
-    place(clouds.points.data() + begin, n);
-    place(normals.data() + begin, n);
-    place(features.valid.data() + begin, n);
+    const auto points = place(clouds.points.data() + begin, n);
+    const auto own_normals = place(normals.data() + begin, n);
+    const auto has_feature = place(features.valid.data() + begin, n);
     // The hash table serves clouds without a table of bricks.
     const bool hashed = !layout.has_table();
     constexpr std::size_t kStarts = ClosestGridView::kBlockCells + 1;
@@ -167,24 +186,23 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
                           hashed ? closest.table_offset[c + 1] - closest.table_offset[c] : 0,
                       starts = hashed ? grid_size.blocks * kStarts : 0,
                       candidates = hashed ? grid_size.candidates : 0;
-    place(closest.table.data() + closest.table_offset[c], table_size);
-    place(closest.cell_start.data() + closest.blocks.offset[c] * kStarts, starts);
-    place(closest.candidates.data() + closest.candidate_offset[c], candidates);
+    const auto table = place(closest.table.data() + closest.table_offset[c], table_size);
+    const auto cell_start =
+        place(closest.cell_start.data() + closest.blocks.offset[c] * kStarts, starts);
+    const auto candidate =
+        place(closest.candidates.data() + closest.candidate_offset[c], candidates);
     const bool has_wide = wide_features.dimension[c] > 0 && n > 0;
-    place(wide_features.valid.data() + (has_wide ? begin : 0), has_wide ? n : 0);
+    const auto wide_valid =
+        place(wide_features.valid.data() + (has_wide ? begin : 0), has_wide ? n : 0);
     const std::uint32_t map_begin = depth_maps.offset[c],
                         maps = depth_maps.offset[c + 1] - map_begin;
-    place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells,
-          std::size_t(maps) * kMapCells);
-    place(depth_maps.viewpoints.data() + map_begin, maps);
+    const auto depth = place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells,
+                             std::size_t(maps) * kMapCells);
+    const auto viewpoints = place(depth_maps.viewpoints.data() + map_begin, maps);
     const SurfaceSideGrid& box = surface_sides.boxes[c];
-    place(surface_sides.words.data() + surface_sides.offset[c], box.words());
+    const auto side_words =
+        place(surface_sides.words.data() + surface_sides.offset[c], box.words());
     // Space for the arrays that are computed in place.
-    const auto reserve = [&](std::size_t more) {
-      const std::size_t at = bytes;
-      bytes += (more + 255) / 256 * 256;
-      return at;
-    };
     const HalfCopy copy = facts.feature_dimension == 0 ? HalfCopy::turned : HalfCopy::plain;
     const auto reserve_aids = [&](std::uint32_t dimension, HalfCopy copy_of) {
       FeatureAidsPlaces at{};
@@ -195,44 +213,42 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     const float* const narrow_rows = features.values.data() + features.offset[c];
     const float* const wide_rows = wide_features.values.data() + wide_features.offset[c];
     const std::uint32_t wide_dimension = has_wide ? wide_features.dimension[c] : 0;
-    const std::size_t narrow_at = reserve(n * row_stride(cloud->feature_dimension) * sizeof(float));
-    const std::size_t wide_at = reserve(n * row_stride(wide_dimension) * sizeof(float));
+    const auto reserve_rows = [&](std::uint32_t dimension) {
+      return Place<float>{reserve(n * row_stride(dimension) * sizeof(float))};
+    };
+    const auto narrow = reserve_rows(cloud->feature_dimension);
+    const auto wide = reserve_rows(wide_dimension);
     if (half_width(cloud->feature_dimension, copy) == 0)
-      parts.push_back({reinterpret_cast<const char*>(narrow_rows),
-                       reinterpret_cast<char*>(narrow_at),
-                       n * cloud->feature_dimension * sizeof(float)});
+      copy_to(narrow.offset, narrow_rows, n * cloud->feature_dimension);
     const auto aids = reserve_aids(cloud->feature_dimension, copy);
     const auto wide_aids = reserve_aids(wide_dimension, HalfCopy::turned);
-    const std::size_t weights = reserve(n * sizeof(std::uint32_t));
+    const Place<std::uint32_t> weights{reserve(n * sizeof(std::uint32_t))};
     const std::size_t copied = bytes;
     // Filled: tables start empty, and gaps between the arrays are copied with them.
     cloud->data = exec.filled<char>(copied + layout.bytes, 0);
+    char* const memory = cloud->data.data();
     for (std::size_t k = first_part; k < parts.size(); ++k)
-      parts[k].to = cloud->data.data() + reinterpret_cast<std::size_t>(parts[k].to);
-    const Part* part = parts.data() + first_part;
+      parts[k].to = memory + reinterpret_cast<std::size_t>(parts[k].to);
     CloudView& view = cloud->view_on_device;
-    view.points = reinterpret_cast<const Vec3*>(part[0].to);
-    view.normals = reinterpret_cast<const Vec3*>(part[1].to);
-    view.has_feature = reinterpret_cast<const std::uint8_t*>(part[2].to);
+    view.points = points.in(memory);
+    view.normals = own_normals.in(memory);
+    view.has_feature = has_feature.in(memory);
     view.size = cloud->size;
     view.feature_dimension = cloud->feature_dimension;
     view.radius = cloud->radius;
     view.closest = {1.0f / closest.geometry[c].cell_size,
-                    {reinterpret_cast<const CellEntry*>(part[3].to), table_size},
-                    {reinterpret_cast<const std::uint32_t*>(part[4].to), starts},
-                    {reinterpret_cast<const std::uint32_t*>(part[5].to), candidates}};
+                    {table.in(memory), table_size},
+                    {cell_start.in(memory), starts},
+                    {candidate.in(memory), candidates}};
     view.executor_data = cloud.get();
-    view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[6].to) : nullptr;
-    view.visibility = {reinterpret_cast<const std::uint16_t*>(part[7].to),
-                       reinterpret_cast<const Vec3*>(part[8].to), maps, depth_maps.step};
-    view.surface_sides = {
-        box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[9].to) : nullptr};
-    char* const memory = cloud->data.data();
-    float* const narrow_to = reinterpret_cast<float*>(memory + narrow_at);
-    float* const wide_to = reinterpret_cast<float*>(memory + wide_at);
+    view.has_wide_feature = has_wide ? wide_valid.in(memory) : nullptr;
+    view.visibility = {depth.in(memory), viewpoints.in(memory), maps, depth_maps.step};
+    view.surface_sides = {box, box.words() > 0 ? side_words.in(memory) : nullptr};
+    float* const narrow_to = narrow.in(memory);
+    float* const wide_to = wide.in(memory);
     view.features = narrow_to;
     view.wide_features = has_wide ? wide_to : nullptr;
-    normal_weight.push_back(reinterpret_cast<std::uint32_t*>(memory + weights));
+    normal_weight.push_back(weights.in(memory));
     view.normal_weight = normal_weight.back();
     const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of,
                              const float* rows, float* padded, const std::uint8_t* valid,
@@ -246,22 +262,18 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     if (has_wide)
       measure(cloud->wide_aids, wide_aids, HalfCopy::turned, wide_rows, wide_to,
               view.has_wide_feature, wide_dimension, &counts.data()[c].extreme_wide);
-    place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
+    place_scoring_data(layout, closest.geometry[c], memory + copied, *cloud);
     out.push_back(std::move(cloud));
   }
   const auto parts_on_device = exec.upload(parts);
-  copy_parts<<<dim3(16, static_cast<unsigned>(parts.size())), 256, 0, exec.stream()>>>(
-      parts_on_device.data());
-  check_launch("copy_parts");
+  launch(exec, "copy_parts", copy_parts, {{16, static_cast<unsigned>(parts.size())}, 256},
+         parts_on_device.data());
   const auto normal_weight_on_device = exec.upload(normal_weight);
   const dim3 grid(8, static_cast<unsigned>(clouds_count));
-  count<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(),
-                                         features.valid.data(), normal_weight_on_device.data(),
-                                         counts.data());
-  check_launch("count");
-  weight_by_normals<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(),
-                                                     normal_weight_on_device.data());
-  check_launch("weight_by_normals");
+  launch(exec, "count", count, {grid, 256}, segments.on_device.data(), normals.data(),
+         features.valid.data(), normal_weight_on_device.data(), counts.data());
+  launch(exec, "weight_by_normals", weight_by_normals, {grid, 256}, segments.on_device.data(),
+         counts.data(), normal_weight_on_device.data());
   fill_feature_aids(exec, features_to_measure);
   fill_scoring_data(exec, out, closest);
   const Counts* counted = exec.download(counts.data(), clouds_count);

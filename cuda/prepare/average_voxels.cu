@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "algorithm/normal.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
@@ -145,13 +146,11 @@ void average_voxels(Exec& exec, const Average& voxels, std::size_t clouds, std::
   const auto list = exec.buffer<uint2>(most_crowded);
   const Crowded crowded{count.data(), list.data()};
   const dim3 grid(std::max(1u, blocks_for(largest, kThreads)), static_cast<unsigned>(clouds));
-  average<<<grid, kThreads, 0, exec.stream()>>>(voxels, crowded);
-  check_launch("average");
+  launch(exec, "average", average, {grid, kThreads}, voxels, crowded);
   if (most_crowded == 0) return;
   const auto blocks = std::min<std::size_t>(most_crowded, std::size_t(exec.multiprocessors()) * 4);
-  average_crowded<<<static_cast<unsigned>(blocks), kCrowdedThreads, 0, exec.stream()>>>(voxels,
-                                                                                        crowded);
-  check_launch("average_crowded");
+  launch(exec, "average_crowded", average_crowded, {static_cast<unsigned>(blocks), kCrowdedThreads},
+         voxels, crowded);
 }
 
 }  // namespace gpureg::cuda

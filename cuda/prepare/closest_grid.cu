@@ -2,6 +2,7 @@
 #include "cuda/common/stages.hpp"
 #include "cuda/device/group_by_cell.cuh"
 #include "cuda/device/hash_table.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/prepare/closest_lists.hpp"
 
 namespace gpureg::cuda {
@@ -84,12 +85,12 @@ ClosestGrids build_closest_grids(Exec& exec, const DownsampledClouds& clouds, co
   const auto table_offset = exec.upload(out.table_offset);
   out.table = exec.filled<CellEntry>(out.table_offset.back(), 0xff);
   out.block = exec.buffer<Cell>(out.blocks.total());
-  write_blocks<<<dim3(std::max(1u, std::min(blocks_for(out.blocks.largest, 128), 1024u)),
-                      static_cast<unsigned>(count)),
-                 128, 0, exec.stream()>>>(out.blocks.on_device.data(), block_of, groups.item.data(),
-                                          groups.start.data(), table_offset.data(),
-                                          out.block.data(), out.table.data());
-  check_launch("write_blocks");
+  launch(exec, "write_blocks", write_blocks,
+         {{std::max(1u, std::min(blocks_for(out.blocks.largest, 128), 1024u)),
+           static_cast<unsigned>(count)},
+          128},
+         out.blocks.on_device.data(), block_of, groups.item.data(), groups.start.data(),
+         table_offset.data(), out.block.data(), out.table.data());
   fill_closest_lists(exec, clouds, grids, geometry.data(), options, out);
   return out;
 }

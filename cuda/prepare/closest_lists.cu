@@ -3,6 +3,8 @@
 
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/entry_of.cuh"
+#include "cuda/device/launch.cuh"
+#include "cuda/device/warp.cuh"
 #include "cuda/prepare/near_lists.hpp"
 #include "cuda/prepare/neighbor_rows.cuh"
 #include "pipeline/checks.hpp"
@@ -194,12 +196,7 @@ __global__ void __launch_bounds__(kThreads) count_candidates(Lists l) {
   if (threadIdx.x >= 32) return;
   std::uint32_t mine = 0;
   for (int k = 0; k < 16; ++k) mine += counts[threadIdx.x * 16 + k];
-  std::uint32_t sum = mine;
-  for (int step = 1; step < 32; step *= 2) {
-    const std::uint32_t below = __shfl_up_sync(~0u, sum, step);
-    if (threadIdx.x >= static_cast<unsigned>(step)) sum += below;
-  }
-  std::uint32_t at = sum - mine;
+  std::uint32_t at = warp_prefix_sum(mine) - mine;
   std::uint32_t* start = l.cell_start + static_cast<std::size_t>(b) * (kCells + 1);
   for (int k = 0; k < 16; ++k) {
     start[threadIdx.x * 16 + k] = at;
@@ -265,9 +262,8 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   l.list_start = list_start.data();
   l.totals = totals.data();
   l.cell_start = out.cell_start.data();
-  count_near<<<blocks_for(std::size_t(blocks) * 32, kThreads), kThreads, 0, exec.stream()>>>(
-      l, blocks);
-  check_launch("count_near");
+  launch(exec, "count_near", count_near, {blocks_for(std::size_t(blocks) * 32, kThreads), kThreads},
+         l, blocks);
   exclusive_sum(exec, near_start.data(), near_start.data(), blocks + 1);
   const unsigned long long* near_total = exec.download(totals.data(), 1);
   exec.synchronize();
@@ -281,10 +277,8 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   l.near = near.data();
   l.used = used.data();
   l.nearest = nearest.data();
-  list_near<<<blocks, kThreads, 0, exec.stream()>>>(l);
-  check_launch("list_near");
-  count_candidates<<<blocks, kThreads, 0, exec.stream()>>>(l);
-  check_launch("count_candidates");
+  launch(exec, "list_near", list_near, {blocks, kThreads}, l);
+  launch(exec, "count_candidates", count_candidates, {blocks, kThreads}, l);
   exclusive_sum(exec, list_start.data(), list_start.data(), blocks + 1);
   exclusive_sum(exec, used.data(), used.data(), *near_total + 1);
   const unsigned long long* most = exec.download(totals.data() + 1, 1);
@@ -300,8 +294,7 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   out.candidates = exec.buffer<std::uint32_t>(out.candidate_offset.back());
   l.candidate_offset = candidate_offset.data();
   l.candidates = out.candidates.data();
-  write_candidates<<<blocks, kThreads, 0, exec.stream()>>>(l);
-  check_launch("write_candidates");
+  launch(exec, "write_candidates", write_candidates, {blocks, kThreads}, l);
   fill_near_lists(exec, near_start.data(), near.data(), used.data(),
                   static_cast<std::uint32_t>(*near_total), out);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "cuda/common/stages.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -86,12 +87,11 @@ DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const Downsampl
     batch.inverse_step = 1.0f / out.step;
     batch.nearest = nearest.data();
     batch.depth = out.depth.data();
-    draw_points<<<dim3(std::max(1u, std::min(blocks_for(clouds.raw.segments.largest, 256), 64u)),
-                       count),
-                  256, 0, exec.stream()>>>(batch);
-    check_launch("draw_points");
-    erode_maps<<<dim3(blocks_for(kMapCells, 256), count), 256, 0, exec.stream()>>>(batch);
-    check_launch("erode_maps");
+    launch(
+        exec, "draw_points", draw_points,
+        {{std::max(1u, std::min(blocks_for(clouds.raw.segments.largest, 256), 64u)), count}, 256},
+        batch);
+    launch(exec, "erode_maps", erode_maps, {{blocks_for(kMapCells, 256), count}, 256}, batch);
   }
   return out;
 }

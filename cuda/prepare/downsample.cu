@@ -5,6 +5,7 @@
 #include "algorithm/voxel.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/device/group_by_cell.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 #include "cuda/prepare/average_voxels.hpp"
 #include "pipeline/checks.hpp"
@@ -175,9 +176,8 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds,
   auto extents = exec.upload(empty);
   {
     const auto slots_on_device = exec.upload(slots);
-    measure_box<<<grid, kThreads, 0, exec.stream()>>>(raw.on_device.data(), slots_on_device.data(),
-                                                      extents.data());
-    check_launch("measure_box");
+    launch(exec, "measure_box", measure_box, {grid, kThreads}, raw.on_device.data(),
+           slots_on_device.data(), extents.data());
   }
   const Extent* boxes = exec.download(extents.data(), clouds.size);
   exec.synchronize();
@@ -192,9 +192,8 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds,
     any_guides = any_guides || out.facts[c].has_guides;
   }
   auto slots_on_device = exec.upload(slots);
-  measure_radius<<<grid, kThreads, 0, exec.stream()>>>(raw.on_device.data(), slots_on_device.data(),
-                                                       extents.data());
-  check_launch("measure_radius");
+  launch(exec, "measure_radius", measure_radius, {grid, kThreads}, raw.on_device.data(),
+         slots_on_device.data(), extents.data());
   const Groups voxels = group_by_cell(
       exec, raw, ranges,
       VoxelOf{slots_on_device.data(), options.voxel_size > 0 ? 1.0f / options.voxel_size : 0.0f});

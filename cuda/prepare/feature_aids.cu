@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "algorithm/fpfh.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
@@ -172,12 +173,9 @@ void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds)
   }
   const auto on_device = exec.upload(slots);
   const dim3 grid(16, static_cast<unsigned>(slots.size()));
-  find_largest<<<grid, 256, 0, exec.stream()>>>(on_device.data());
-  check_launch("find_largest");
-  measure_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
-  check_launch("measure_features");
-  find_repeated_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
-  check_launch("find_repeated_features");
+  launch(exec, "find_largest", find_largest, {grid, 256}, on_device.data());
+  launch(exec, "measure_features", measure_features, {grid, 256}, on_device.data());
+  launch(exec, "find_repeated_features", find_repeated_features, {grid, 256}, on_device.data());
 }
 
 }  // namespace gpureg::cuda

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/fpfh.hpp"
 #include "cuda/common/stages.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/prepare/neighbor_rows.cuh"
 
 namespace gpureg::cuda {
@@ -157,10 +158,9 @@ void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& no
               const std::uint8_t* custom, Features& out) {
   const unsigned clouds_on_grid = static_cast<unsigned>(segments.entries());
   auto sorted_normals = exec.buffer<Vec3>(segments.total());
-  normals_in_cell_order<<<dim3(blocks_for(segments.largest, 256), clouds_on_grid), 256, 0,
-                          exec.stream()>>>(segments.on_device.data(), grids.views.data(),
-                                           normals.data(), sorted_normals.data());
-  check_launch("normals_in_cell_order");
+  launch(exec, "normals_in_cell_order", normals_in_cell_order,
+         {{blocks_for(segments.largest, 256), clouds_on_grid}, 256}, segments.on_device.data(),
+         grids.views.data(), normals.data(), sorted_normals.data());
   auto spfh = exec.buffer<float>(static_cast<std::size_t>(segments.total()) * kFpfhSize);
   FpfhBatch batch{};
   batch.offset = segments.on_device.data();
@@ -173,10 +173,10 @@ void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& no
   batch.valid = out.valid.data();
   batch.custom = custom;
   const dim3 grid(blocks_for(segments.largest, kWarps), clouds_on_grid);
-  simplified_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
-  check_launch("simplified_histograms");
-  weighted_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
-  check_launch("weighted_histograms");
+  launch(exec, "simplified_histograms", simplified_histograms, {grid, 32 * kWarps}, batch,
+         sorted_normals.data());
+  launch(exec, "weighted_histograms", weighted_histograms, {grid, 32 * kWarps}, batch,
+         sorted_normals.data());
 }
 
 }  // namespace
@@ -211,12 +211,11 @@ Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuf
   if (any_custom) {
     const auto dimension_on_device = exec.upload(out.dimension);
     const auto in_offset_on_device = exec.upload(in_offset);
-    take_features<<<dim3(blocks_for(segments.largest, 256), static_cast<unsigned>(count)), 256, 0,
-                    exec.stream()>>>(segments.on_device.data(), dimension_on_device.data(),
-                                     custom_on_device.data(), clouds.features.data(),
-                                     in_offset_on_device.data(), offset_on_device.data(),
-                                     out.values.data(), out.valid.data());
-    check_launch("take_features");
+    launch(exec, "take_features", take_features,
+           {{blocks_for(segments.largest, 256), static_cast<unsigned>(count)}, 256},
+           segments.on_device.data(), dimension_on_device.data(), custom_on_device.data(),
+           clouds.features.data(), in_offset_on_device.data(), offset_on_device.data(),
+           out.values.data(), out.valid.data());
   }
   return out;
 }

@@ -2,6 +2,7 @@
 #include "cuda/common/stages.hpp"
 #include "cuda/device/group_by_cell.cuh"
 #include "cuda/device/hash_table.cuh"
+#include "cuda/device/launch.cuh"
 #include "pipeline/checks.hpp"
 
 namespace gpureg::cuda {
@@ -115,12 +116,10 @@ Grids build_grids(Exec& exec, const DownsampledClouds& clouds, const PrepareOpti
   batch.table_offset = table_offset_on_device.data();
   batch.cell_start = out.cell_start.data();
   batch.sorted_points = out.points.data();
-  fill_grid<<<grid, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("fill_grid");
+  launch(exec, "fill_grid", fill_grid, {grid, kThreads}, batch);
   const auto squares = exec.filled<unsigned long long>(count, 0);
-  measure_density<<<grid, kThreads, 0, exec.stream()>>>(
-      segments.on_device.data(), cells.rank.data(), out.cell_start.data(), squares.data());
-  check_launch("measure_density");
+  launch(exec, "measure_density", measure_density, {grid, kThreads}, segments.on_device.data(),
+         cells.rank.data(), out.cell_start.data(), squares.data());
   const unsigned long long* sums = exec.download(squares.data(), count);
   exec.synchronize();
   for (std::size_t c = 0; c < count; ++c)

@@ -4,6 +4,7 @@
 #include "cuda/common/candidate_lists.hpp"
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/entry_of.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
@@ -66,10 +67,9 @@ void measure_near_lists(Exec& exec, const std::uint32_t* near_start, const std::
   const std::uint32_t blocks = out.blocks.total();
   out.list_start = exec.buffer<std::uint32_t>(blocks);
   const auto sizes = exec.filled<Sizes>(clouds, 0);
-  measure<<<blocks, kCells, 0, exec.stream()>>>(
-      out.blocks.on_device.data(), static_cast<std::uint32_t>(clouds), near_start, used,
-      out.cell_start.data(), out.list_start.data(), sizes.data());
-  check_launch("measure");
+  launch(exec, "measure", measure, {blocks, kCells}, out.blocks.on_device.data(),
+         static_cast<std::uint32_t>(clouds), near_start, used, out.cell_start.data(),
+         out.list_start.data(), sizes.data());
   exclusive_sum(exec, out.list_start.data(), out.list_start.data(), blocks);
   const Sizes* host = exec.download(sizes.data(), clouds);
   exec.synchronize();
@@ -85,13 +85,11 @@ void fill_near_lists(Exec& exec, const std::uint32_t* near_start, const std::uin
   for (const ClosestGridSize& size : out.size) kept += size.near_points;
   out.near = exec.buffer<std::uint32_t>(kept);
   out.near_start = exec.buffer<std::uint32_t>(blocks + 1);
-  write_starts<<<blocks_for(std::size_t(blocks) + 1, 256), 256, 0, exec.stream()>>>(
-      near_start, used, blocks, out.near_start.data());
-  check_launch("write_starts");
+  launch(exec, "write_starts", write_starts, {blocks_for(std::size_t(blocks) + 1, 256), 256},
+         near_start, used, blocks, out.near_start.data());
   if (points == 0) return;
-  keep_candidates<<<blocks_for(points, 256), 256, 0, exec.stream()>>>(near, used, points,
-                                                                      out.near.data());
-  check_launch("keep_candidates");
+  launch(exec, "keep_candidates", keep_candidates, {blocks_for(points, 256), 256}, near, used,
+         points, out.near.data());
 }
 
 }  // namespace gpureg::cuda

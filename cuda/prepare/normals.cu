@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "cuda/common/stages.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -51,13 +52,11 @@ void turn_to_viewpoints(Exec& exec, const DownsampledClouds& clouds,
   const auto count = exec.filled<std::uint32_t>(segments.entries(), 0);
   const dim3 grid(blocks_for(segments.largest, kThreads),
                   static_cast<unsigned>(segments.entries()));
-  find_backs<<<grid, kThreads, 0, exec.stream()>>>(segments.on_device.data(), clouds.points.data(),
-                                                   normals, viewpoints, asks_on_device.data(),
-                                                   away.data(), count.data());
-  check_launch("find_backs");
-  turn_backs<<<grid, kThreads, 0, exec.stream()>>>(segments.on_device.data(), asks_on_device.data(),
-                                                   away.data(), count.data(), normals);
-  check_launch("turn_backs");
+  launch(exec, "find_backs", find_backs, {grid, kThreads}, segments.on_device.data(),
+         clouds.points.data(), normals, viewpoints, asks_on_device.data(), away.data(),
+         count.data());
+  launch(exec, "turn_backs", turn_backs, {grid, kThreads}, segments.on_device.data(),
+         asks_on_device.data(), away.data(), count.data(), normals);
 }
 
 }  // namespace
@@ -81,10 +80,9 @@ DeviceBuffer<Vec3> estimate_normals(Exec& exec, const DownsampledClouds& clouds,
   const auto viewpoints_on_device = exec.upload(viewpoints);
   const dim3 grid(blocks_for(segments.largest, kThreads),
                   static_cast<unsigned>(segments.entries()));
-  orient_plane_normals<<<grid, kThreads, 0, exec.stream()>>>(
-      segments.on_device.data(), grids.views.data(), clouds.guides.data(),
-      viewpoints_on_device.data(), radius, normals.data());
-  check_launch("orient_plane_normals");
+  launch(exec, "orient_plane_normals", orient_plane_normals, {grid, kThreads},
+         segments.on_device.data(), grids.views.data(), clouds.guides.data(),
+         viewpoints_on_device.data(), radius, normals.data());
   turn_to_viewpoints(exec, clouds, viewpoints_on_device.data(), normals.data());
   return normals;
 }

@@ -6,6 +6,7 @@
 #include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/packed_normal.cuh"
 #include "cuda/device/entry_of.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/prepare/brick_place.cuh"
 #include "cuda/prepare/scoring_data.hpp"
 
@@ -82,11 +83,9 @@ __global__ void copy_near_points(const ScoringSlot* slots) {
 void pack_lists(Exec& exec, const DeviceBuffer<ScoringSlot>& slots, std::uint32_t most_blocks) {
   constexpr std::uint32_t kMostThreadBlocks = 1024;  // of a cloud
   const unsigned count = static_cast<unsigned>(slots.size());
-  write_lists<<<dim3(std::max(1u, std::min(most_blocks, kMostThreadBlocks)), count), kCells, 0,
-                exec.stream()>>>(slots.data());
-  check_launch("write_lists");
-  copy_near_points<<<dim3(64, count), 256, 0, exec.stream()>>>(slots.data());
-  check_launch("copy_near_points");
+  launch(exec, "write_lists", write_lists,
+         {{std::max(1u, std::min(most_blocks, kMostThreadBlocks)), count}, kCells}, slots.data());
+  launch(exec, "copy_near_points", copy_near_points, {{64, count}, 256}, slots.data());
 }
 
 }  // namespace gpureg::cuda

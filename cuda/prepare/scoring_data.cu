@@ -9,6 +9,7 @@
 #include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/packed_normal.cuh"
 #include "cuda/device/device_algorithms.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/prepare/brick_place.cuh"
 #include "cuda/prepare/directions.hpp"
 
@@ -258,22 +259,17 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   auto keys = exec.buffer<std::uint64_t>(total);
   auto index = exec.buffer<std::uint32_t>(total);
   const unsigned count = static_cast<unsigned>(clouds.size());
-  mark_bricks<<<dim3(8, count), 128, 0, exec.stream()>>>(on_device.data());
-  check_launch("mark_bricks");
-  number_bricks<<<count, kNumberThreads, 0, exec.stream()>>>(on_device.data());
-  check_launch("number_bricks");
-  summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
-  check_launch("summarize");
+  launch(exec, "mark_bricks", mark_bricks, {{8, count}, 128}, on_device.data());
+  launch(exec, "number_bricks", number_bricks, {count, kNumberThreads}, on_device.data());
+  launch(exec, "summarize", summarize, {{128, count}, 256}, on_device.data(), tables.data());
   pack_lists(exec, on_device, grids.blocks.largest);
-  write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(),
-                                                                index.data());
-  check_launch("write_morton_keys");
+  launch(exec, "write_morton_keys", write_morton_keys, {{16, count}, 256}, on_device.data(),
+         keys.data(), index.data());
   int bits = kMortonBits;
   while ((std::size_t(1) << (bits - kMortonBits)) < clouds.size()) ++bits;
   sort_pairs(exec, keys, index, bits);
-  write_order<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), index.data(),
-                                                          tables.data());
-  check_launch("write_order");
+  launch(exec, "write_order", write_order, {{16, count}, 256}, on_device.data(), index.data(),
+         tables.data());
 }
 
 }  // namespace gpureg::cuda

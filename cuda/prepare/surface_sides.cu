@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "cuda/common/stages.hpp"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -71,10 +72,8 @@ SurfaceSides build_surface_sides(Exec& exec, const DownsampledClouds& clouds,
     return dim3(std::max(1u, std::min(blocks_for(items, 256), 64u)),
                 static_cast<unsigned>(entries));
   };
-  mark_surfaces<<<grid(clouds.segments.largest), 256, 0, exec.stream()>>>(batch);
-  check_launch("mark_surfaces");
-  march<<<grid(2 * std::size_t(clouds.segments.largest)), 256, 0, exec.stream()>>>(batch);
-  check_launch("march");
+  launch(exec, "mark_surfaces", mark_surfaces, {grid(clouds.segments.largest), 256}, batch);
+  launch(exec, "march", march, {grid(2 * std::size_t(clouds.segments.largest)), 256}, batch);
   return out;
 }
 

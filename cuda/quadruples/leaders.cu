@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/device/entry_of.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/quadruples/count_inliers.cuh"
 
 namespace gpureg::cuda {
@@ -51,11 +52,12 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
 
 void find_leaders(Exec& exec, const ScoreBatch& batch) {
   const unsigned most_blocks = static_cast<unsigned>(exec.multiprocessors()) * 8;
-  probe<<<std::min(
+  launch(exec, "probe", probe,
+         {std::min(
               blocks_for(static_cast<std::size_t>(batch.pair_count) * kProbes * 32, kProbeThreads),
               most_blocks),
-          kProbeThreads, 0, exec.stream()>>>(batch);
-  check_launch("probe");
+          kProbeThreads},
+         batch);
 }
 
 }  // namespace gpureg::cuda

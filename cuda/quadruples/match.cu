@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/common/feature_query.hpp"
 #include "cuda/common/stages.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
@@ -126,10 +127,10 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const Registratio
   batch.room = out.room.on_device.data();
   batch.out = out.pairs.data();
   batch.count = out.count.data();
-  collect_matches<<<dim3(std::max(1u, blocks_for(out.room.largest, kTile)),
-                         static_cast<unsigned>(pairs.size)),
-                    kTile, 0, exec.stream()>>>(batch);
-  check_launch("collect_matches");
+  launch(exec, "collect_matches", collect_matches,
+         {{std::max(1u, blocks_for(out.room.largest, kTile)), static_cast<unsigned>(pairs.size)},
+          kTile},
+         batch);
   return out;
 }
 

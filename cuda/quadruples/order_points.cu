@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "cuda/device/launch.cuh"
 #include "cuda/quadruples/count_inliers.cuh"
 
 namespace gpureg::cuda {
@@ -168,12 +169,12 @@ void score_samples(Exec& exec, const ScoreBatch& batch, std::uint32_t most_group
   const auto inliers =
       exec.filled<std::uint32_t>(static_cast<std::size_t>(batch.pair_count) * kSamples, 0);
   const std::uint32_t poses = batch.pair_count < 8 ? 2 : kPoses;  // few pairs: more threads
-  try_samples<<<dim3(blocks_for(std::size_t(most_groups) * 32, kThreads), kSamples / poses,
-                     batch.pair_count),
-                kThreads, 0, exec.stream()>>>(batch, poses, inliers.data());
-  check_launch("try_samples");
-  sort_by_failures<<<batch.pair_count, kOrderThreads, 0, exec.stream()>>>(batch, inliers.data());
-  check_launch("sort_by_failures");
+  launch(exec, "try_samples", try_samples,
+         {{blocks_for(std::size_t(most_groups) * 32, kThreads), kSamples / poses, batch.pair_count},
+          kThreads},
+         batch, poses, inliers.data());
+  launch(exec, "sort_by_failures", sort_by_failures, {batch.pair_count, kOrderThreads}, batch,
+         inliers.data());
 }
 
 }  // namespace gpureg::cuda

@@ -4,6 +4,7 @@
 #include "cuda/common/closest_cells.cuh"
 #include "cuda/common/stages.hpp"
 #include "cuda/device/block_sum.cuh"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -118,8 +119,7 @@ DeviceBuffer<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
   batch.max_distance = options.prepare.max_correspondence_distance;
   batch.kernel_width = options.refine.kernel_width;
   batch.out = out.data();
-  refine<<<static_cast<unsigned>(pairs.size), kThreads, 0, exec.stream()>>>(batch);
-  check_launch("refine");
+  launch(exec, "refine", refine, {static_cast<unsigned>(pairs.size), kThreads}, batch);
   return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/common/stages.hpp"
 #include "cuda/device/device_algorithms.hpp"
+#include "cuda/device/launch.cuh"
 #include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
@@ -198,11 +199,7 @@ __global__ void __launch_bounds__(kWordsPerChunk)
   if (first >= room) return;
   std::uint32_t word = words[at * kWordsPerChunk + threadIdx.x];
   const std::uint32_t mine = static_cast<std::uint32_t>(__popc(static_cast<int>(word)));
-  std::uint32_t sum = mine;
-  for (std::uint32_t step = 1; step < 32; step *= 2) {
-    const std::uint32_t below = __shfl_up_sync(~0u, sum, step);
-    if (lane >= step) sum += below;
-  }
+  const std::uint32_t sum = warp_prefix_sum(mine);
   if (lane == 31) warp_sums[warp] = sum;
   __syncthreads();
   std::uint32_t rank = first + sum - mine;
@@ -243,9 +240,8 @@ Samples sample_quadruples(Exec& exec, const Matches& matches, const Registration
   batch.tau2 = options.quadruples.edge_similarity * options.quadruples.edge_similarity;
   batch.words = words.data();
   batch.chunk_count = before.data();
-  sample<<<dim3(blocks, static_cast<unsigned>(pairs)), kThreads, shared_bytes, exec.stream()>>>(
-      batch, capacity);
-  check_launch("sample");
+  launch(exec, "sample", sample, {{blocks, static_cast<unsigned>(pairs)}, kThreads, shared_bytes},
+         batch, capacity);
   exclusive_sum(exec, before.data(), before.data(), all_chunks + 1);
   // One number per pair: the survivors before its first chunk.
   std::uint32_t* starts = exec.staging<std::uint32_t>(pairs + 1);
@@ -283,11 +279,10 @@ Quadruples survivors_of(Exec& exec, const Samples& samples, pipeline::Run pairs)
   out.id = exec.buffer<std::uint32_t>(out.segments.total());
   if (out.segments.total() == 0) return out;
   const std::size_t first_chunk = pairs.begin * samples.chunks;
-  expand<<<dim3(samples.chunks, static_cast<unsigned>(pairs.size())), kWordsPerChunk, 0,
-           exec.stream()>>>(samples.words.data() + first_chunk * kWordsPerChunk,
-                            samples.before.data() + first_chunk, samples.chunks,
-                            out.segments.on_device.data(), out.id.data());
-  check_launch("expand");
+  launch(exec, "expand", expand,
+         {{samples.chunks, static_cast<unsigned>(pairs.size())}, kWordsPerChunk},
+         samples.words.data() + first_chunk * kWordsPerChunk, samples.before.data() + first_chunk,
+         samples.chunks, out.segments.on_device.data(), out.id.data());
   return out;
 }
 

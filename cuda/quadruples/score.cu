@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/common/stages.hpp"
 #include "cuda/device/entry_of.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/quadruples/count_inliers.cuh"
 
 namespace gpureg::cuda {
@@ -212,8 +213,8 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
     if (total <= processors * kByBlock) {
-      score_by_block<<<std::min(total, processors * 8), kProbeThreads, 0, exec.stream()>>>(batch);
-      check_launch("score_by_block");
+      launch(exec, "score_by_block", score_by_block,
+             {std::min(total, processors * 8), kProbeThreads}, batch);
       return select_best(exec, batch, total);
     }
     find_leaders(exec, batch);
@@ -228,11 +229,10 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
                                  pair.cells.brick_runs() * sizeof(uint2);
       if (pair.cells.nx > 0 && wanted <= room) bytes = std::max(bytes, wanted);
     }
-    score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes,
-                   exec.stream()>>>(batch, slices_on_device.data(),
-                                    static_cast<std::uint32_t>(slices.size()),
-                                    static_cast<std::uint32_t>(bytes));
-    check_launch("score_slices");
+    launch(exec, "score_slices", score_slices,
+           {std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes}, batch,
+           slices_on_device.data(), static_cast<std::uint32_t>(slices.size()),
+           static_cast<std::uint32_t>(bytes));
   }
   return select_best(exec, batch, total);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/device/entry_of.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/quadruples/score_batch.cuh"
 
 namespace gpureg::cuda {
@@ -74,18 +75,14 @@ DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uin
   const auto ties = exec.buffer<std::uint32_t>(total);
   const auto tie_count = exec.filled<std::uint32_t>(1, 0);
   if (total > 0) {
-    list_ties<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(
-        batch, ties.data(), tie_count.data(), residual.data());
-    check_launch("list_ties");
+    launch(exec, "list_ties", list_ties, {blocks_for(total, kThreads), kThreads}, batch,
+           ties.data(), tie_count.data(), residual.data());
     const unsigned full = static_cast<unsigned>(exec.multiprocessors()) * 8;
-    measure_ties<<<full, kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(),
-                                                       residual.data());
-    check_launch("measure_ties");
+    launch(exec, "measure_ties", measure_ties, {full, kThreads}, batch, ties.data(),
+           tie_count.data(), residual.data());
   }
-  write_best<<<1, kRankThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(),
-                                                    residual.data(), least.data(), winner.data(),
-                                                    best.data());
-  check_launch("write_best");
+  launch(exec, "write_best", write_best, {1, kRankThreads}, batch, ties.data(), tie_count.data(),
+         residual.data(), least.data(), winner.data(), best.data());
   return best;
 }
 

@@ -3,6 +3,7 @@
 #include "cuda/common/closest_cells.cuh"
 #include "cuda/common/stages.hpp"
 #include "cuda/device/block_sum.cuh"
+#include "cuda/device/launch.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -85,12 +86,12 @@ DeviceBuffer<Verification> verify_poses(Exec& exec, Span<const PairView> pairs,
   const std::size_t parts = std::max<std::size_t>(
       2, std::min<std::size_t>(kMaxParts,
                                4 * exec.multiprocessors() / std::max<std::size_t>(1, pairs.size)));
-  verify<<<dim3(static_cast<unsigned>(pairs.size), static_cast<unsigned>(parts)), kThreads, 0,
-           exec.stream()>>>(views.data(), poses.data(),
-                            inlier_test(options.prepare.max_correspondence_distance,
-                                        options.quadruples.max_verification_normal_angle),
-                            out.data());
-  check_launch("verify");
+  launch(exec, "verify", verify,
+         {{static_cast<unsigned>(pairs.size), static_cast<unsigned>(parts)}, kThreads},
+         views.data(), poses.data(),
+         inlier_test(options.prepare.max_correspondence_distance,
+                     options.quadruples.max_verification_normal_angle),
+         out.data());
   return out;
 }
 

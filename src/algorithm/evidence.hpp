@@ -76,6 +76,15 @@ inline float mode_trace(float degrees) {
       1.0 + 2.0 * portable::cos(static_cast<double>(degrees) * 3.14159265358979323846 / 180.0));
 }
 
+/// Share of the matches' weights that a pose supports, of the worse side. total: of the source, of
+/// the target.
+GPUREG_HD float smaller_share(const MatchEvidence& m, std::uint64_t source_total,
+                              std::uint64_t target_total) {
+  const float s = static_cast<float>(m.source_weight) / static_cast<float>(source_total);
+  const float t = static_cast<float>(m.target_weight) / static_cast<float>(target_total);
+  return s < t ? s : t;
+}
+
 /// Exponent of the coarse score per unit of free-space violation: a violation of 17 % on one side
 /// halves the score.
 constexpr float kViolationPenalty = 4.0f;

@@ -2,6 +2,7 @@
 #include "cuda/find_points.hpp"
 
 #include "cuda/common/closest_cells.cuh"
+#include "cuda/device/launch.cuh"
 #include "cuda/gpu.hpp"
 
 namespace gpureg::test {
@@ -24,10 +25,9 @@ std::vector<Found> find_points(cuda::Exec& exec, const cuda::CudaCloud& cloud,
                                const std::vector<Vec3>& locations, float max_squared) {
   const auto on_device = exec.upload(locations);
   const auto out = exec.buffer<Found>(locations.size());
-  find<<<cuda::blocks_for(locations.size(), 128), 128, 0, exec.stream()>>>(
-      cloud.view_on_device, cloud.summaries, on_device.data(),
-      static_cast<std::uint32_t>(locations.size()), max_squared, out.data());
-  cuda::check_launch("find");
+  cuda::launch(exec, "find", find, {cuda::blocks_for(locations.size(), 128), 128},
+               cloud.view_on_device, cloud.summaries, on_device.data(),
+               static_cast<std::uint32_t>(locations.size()), max_squared, out.data());
   return host(exec, out.data(), locations.size());
 }
 
