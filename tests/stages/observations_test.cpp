@@ -2,7 +2,7 @@
 // Free space: points in front of an observed surface violate it, weighted by their incidence.
 #include <gtest/gtest.h>
 
-#include "algorithm/evidence.hpp"
+#include "pipeline/evidence_test.hpp"
 #include "support/outcome_bytes.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
@@ -78,9 +78,7 @@ TEST(Observations, EvidenceInGroupsIsThatOfEachPoint) {
                b = seen_from(exec, points_b, {1.5f, -0.2f, 1.0f});
     const ModeOutcome outcome = test::verified_in_place(exec, *a, *b).modes[0];
     const RegistrationOptions options;
-    const EvidenceTest test{
-        inlier_test(options.prepare.max_correspondence_distance, options.evidence.max_normal_angle),
-        options.evidence.free_space_margin, options.evidence.min_range};
+    const EvidenceTest test = pipeline::evidence_test(options);
     const Rigid there = to_rigid(outcome.pose);
     const CloudView s = a->view(), t = b->view();
     SideEvidence forth{}, reverse{};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "confidence/degeneracy_search.hpp"
 #include "cpu/common/exec.hpp"
 #include "cpu/common/stage_data.hpp"
 #include "pipeline/runs.hpp"
@@ -102,9 +103,11 @@ void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
 void drop_returned(Exec& exec, std::vector<std::vector<Mode>>& perturbed,
                    const std::vector<PosesOfPair>& perturbations);
 /// Perturbed poses of the most likely mode of each pair; on the host.
-std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
-                                             Span<const PairOutcome> outcomes,
-                                             const RegistrationOptions& options);
+inline std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
+                                                    Span<const PairOutcome> outcomes,
+                                                    const RegistrationOptions& options) {
+  return confidence::search_degeneracies(inputs, outcomes, options, exec.threads());
+}
 std::vector<std::vector<Mode>> modes_from_poses(Exec& exec, const std::vector<PosesOfPair>& poses);
 /// For poses that were not proposed by the stages before.
 std::vector<Candidates> no_candidates(Exec& exec, Span<const PairView> pairs);

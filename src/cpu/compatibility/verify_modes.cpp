@@ -5,21 +5,10 @@
 #include "cpu/compatibility/moved_points.hpp"
 #include "cpu/compatibility/observations.hpp"
 #include "pipeline/conclude.hpp"
+#include "pipeline/evidence_test.hpp"
 
 namespace gpureg::cpu {
 namespace {
-
-float smaller_share(const MatchEvidence& m, const MatchSet& set) {
-  const float s = static_cast<float>(m.source_weight) / static_cast<float>(set.source_total);
-  const float t = static_cast<float>(m.target_weight) / static_cast<float>(set.target_total);
-  return s < t ? s : t;
-}
-
-EvidenceTest test_of(const RegistrationOptions& options) {
-  return {
-      inlier_test(options.prepare.max_correspondence_distance, options.evidence.max_normal_angle),
-      options.evidence.free_space_margin, options.evidence.min_range};
-}
 
 /// True where the summaries may confirm inliers; otherwise they only refute.
 bool decides(const RegistrationOptions& options) {
@@ -160,7 +149,7 @@ SideEvidence verify_side(MovedPoints& points, const Side& side, const Rigid& pos
 
 void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
                       std::vector<Candidates>& candidates, const RegistrationOptions& options) {
-  const EvidenceTest test = test_of(options);
+  const EvidenceTest test = pipeline::evidence_test(options);
   const SummaryLimits exact(options.evidence.max_normal_angle, true),
       inexact(options.evidence.max_normal_angle, false);
   std::vector<Sample> source(pairs.size), target(pairs.size);
@@ -190,8 +179,9 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<
           const SideEvidence b =
               score_sample(target_points, back, target[p], inverse(pose), test, decides(options));
           candidates[p].coarse_score[k] = coarse_score(
-              smaller_share(candidates[p].matches[k], matches[p]), a,
-              static_cast<float>(source[p].weight), b, static_cast<float>(target[p].weight));
+              smaller_share(candidates[p].matches[k], matches[p].source_total,
+                            matches[p].target_total),
+              a, static_cast<float>(source[p].weight), b, static_cast<float>(target[p].weight));
         }
       });
 }
@@ -200,7 +190,7 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const std::vector<Matc
                   const std::vector<Candidates>& candidates,
                   const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options,
                   Span<PairOutcome> outcomes) {
-  const EvidenceTest test = test_of(options);
+  const EvidenceTest test = pipeline::evidence_test(options);
   const SummaryLimits limits(options.evidence.max_normal_angle, false);
   const float squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
