@@ -113,8 +113,8 @@ void Adopted::take() {
     if (floats == 0) continue;
     part.bytes = floats * sizeof(float);
     part.to = static_cast<float*>(memory_->allocate(part.bytes, part.stream));
-    launch(part.stream, "pack_rows", pack_rows, {blocks_for(floats, 256), 256}, part.from,
-           part.stride, part.width, raw.size, part.to);
+    launch(part.stream, "pack_rows", pack_rows, shape_for(floats, 256), part.from, part.stride,
+           part.width, raw.size, part.to);
     // A thread that waits for it sleeps.
     check(cudaEventCreateWithFlags(&part.written, cudaEventDisableTiming | cudaEventBlockingSync),
           "cudaEventCreateWithFlags");

@@ -187,7 +187,7 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
             kThreads},
            batch.data(), rows_per_part, best.data());
   }
-  launch(exec, "unpack_nearest", unpack_nearest, {{blocks_for(most_queries, 256), entries}, 256},
+  launch(exec, "unpack_nearest", unpack_nearest, shape_for(most_queries, 256, entries),
          batch.data(), best.data(), out.data());
   return out;
 }

@@ -178,8 +178,7 @@ void count_cells(Exec& exec, const Map& map, const Scan* scans, std::size_t most
 
 void raise_least(Exec& exec, const unsigned long long* counts, std::size_t scans, std::size_t most,
                  std::int32_t* least) {
-  launch(exec, "raise_least", raise, {blocks_for(scans, kThreads), kThreads}, counts, scans, most,
-         least);
+  launch(exec, "raise_least", raise, shape_for(scans, kThreads), counts, scans, most, least);
 }
 
 void list_cells(Exec& exec, const Map& map, const Scan* scans, std::size_t most_words,

@@ -192,8 +192,8 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
          ranked.data(), match.data());
   launch(exec, "write_keys", write_keys, {grid, 256}, batch, key.data(), match.data());
   sort_segments(exec, key, match, matches.room, kStrengthBits + 1);
-  launch(exec, "take_seeds", take_seeds, {{blocks_for(out.most, 256), pair_count}, 256}, batch,
-         match.data(), out.most, out.match.data(), out.count.data());
+  launch(exec, "take_seeds", take_seeds, shape_for(out.most, 256, pair_count), batch, match.data(),
+         out.most, out.match.data(), out.count.data());
   return out;
 }
 

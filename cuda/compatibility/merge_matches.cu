@@ -249,8 +249,7 @@ Answers search(Exec& exec, Span<const PairView> pairs, const RegistrationOptions
   out.rows = exec.buffer<std::uint32_t>(at);
   const auto samples_on_device = exec.upload(samples);
   const auto offset_on_device = exec.upload(offset);
-  launch(exec, "write_query_rows", write_query_rows,
-         {{blocks_for(largest, kThreads), static_cast<unsigned>(samples.size())}, kThreads},
+  launch(exec, "write_query_rows", write_query_rows, shape_for(largest, kThreads, samples.size()),
          samples_on_device.data(), offset_on_device.data(), out.rows.data());
   for (std::size_t k = 0; k < queries.size(); ++k)
     queries[k].query_row = out.rows.data() + offset[k];
@@ -320,7 +319,7 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
   batch.total = out.total.data();
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
   launch(exec, "order_matches", order_matches,
-         {{blocks_for(answer_segments.largest, kThreads), pair_count}, kThreads}, batch);
+         shape_for(answer_segments.largest, kThreads, pair_count), batch);
   if (!sort_matches(exec, answer_segments, found.data(), key.data(), answer.data())) {
     constexpr int kOrderBits = 32 + 1;  // order of the match, whether it is dropped
     sort_pairs(exec, key, answer, kOrderBits + bits_for(pairs.size));

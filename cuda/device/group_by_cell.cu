@@ -19,16 +19,16 @@ __global__ void write_starts(const std::uint32_t* rank, std::uint32_t size, std:
 
 void detail::write_group_starts(Exec& exec, std::uint32_t total, Groups& groups) {
   if (total == 0) return;
-  launch(exec, "write_starts", write_starts, {blocks_for(total, 256), 256}, groups.rank.data(),
-         total, groups.start.data());
+  launch(exec, "write_starts", write_starts, shape_for(total, 256), groups.rank.data(), total,
+         groups.start.data());
 }
 
 const std::uint32_t* download_group_offsets(Exec& exec, const Segments& segments,
                                             const Groups& groups) {
   const std::uint32_t count = static_cast<std::uint32_t>(segments.offset.size());
   const auto gathered = exec.buffer<std::uint32_t>(count);
-  launch(exec, "gather_ranks", gather_ranks, {blocks_for(count, 128), 128},
-         segments.on_device.data(), groups.rank.data(), count, gathered.data());
+  launch(exec, "gather_ranks", gather_ranks, shape_for(count, 128), segments.on_device.data(),
+         groups.rank.data(), count, gathered.data());
   return exec.download(gathered.data(), count);
 }
 

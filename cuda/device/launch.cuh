@@ -16,6 +16,11 @@ struct LaunchShape {
   std::size_t shared = 0;
 };
 
+/// A thread for each item, in blocks of so many; rows: the same for each of them (y).
+inline LaunchShape shape_for(std::size_t items, unsigned threads, std::size_t rows = 1) {
+  return {{blocks_for(items, threads), static_cast<unsigned>(rows)}, threads};
+}
+
 /// Enqueues a kernel; an error names it.
 template <typename... Parameters, typename... Arguments>
 void launch(cudaStream_t stream, const char* name, void (*kernel)(Parameters...),

@@ -262,8 +262,7 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   l.list_start = list_start.data();
   l.totals = totals.data();
   l.cell_start = out.cell_start.data();
-  launch(exec, "count_near", count_near, {blocks_for(std::size_t(blocks) * 32, kThreads), kThreads},
-         l, blocks);
+  launch(exec, "count_near", count_near, shape_for(std::size_t(blocks) * 32, kThreads), l, blocks);
   exclusive_sum(exec, near_start.data(), near_start.data(), blocks + 1);
   const unsigned long long* near_total = exec.download(totals.data(), 1);
   exec.synchronize();

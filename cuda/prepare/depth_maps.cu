@@ -91,7 +91,7 @@ DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const Downsampl
         exec, "draw_points", draw_points,
         {{std::max(1u, std::min(blocks_for(clouds.raw.segments.largest, 256), 64u)), count}, 256},
         batch);
-    launch(exec, "erode_maps", erode_maps, {{blocks_for(kMapCells, 256), count}, 256}, batch);
+    launch(exec, "erode_maps", erode_maps, shape_for(kMapCells, 256, count), batch);
   }
   return out;
 }

@@ -159,7 +159,7 @@ void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& no
   const unsigned clouds_on_grid = static_cast<unsigned>(segments.entries());
   auto sorted_normals = exec.buffer<Vec3>(segments.total());
   launch(exec, "normals_in_cell_order", normals_in_cell_order,
-         {{blocks_for(segments.largest, 256), clouds_on_grid}, 256}, segments.on_device.data(),
+         shape_for(segments.largest, 256, clouds_on_grid), segments.on_device.data(),
          grids.views.data(), normals.data(), sorted_normals.data());
   auto spfh = exec.buffer<float>(static_cast<std::size_t>(segments.total()) * kFpfhSize);
   FpfhBatch batch{};
@@ -211,8 +211,7 @@ Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuf
   if (any_custom) {
     const auto dimension_on_device = exec.upload(out.dimension);
     const auto in_offset_on_device = exec.upload(in_offset);
-    launch(exec, "take_features", take_features,
-           {{blocks_for(segments.largest, 256), static_cast<unsigned>(count)}, 256},
+    launch(exec, "take_features", take_features, shape_for(segments.largest, 256, count),
            segments.on_device.data(), dimension_on_device.data(), custom_on_device.data(),
            clouds.features.data(), in_offset_on_device.data(), offset_on_device.data(),
            out.values.data(), out.valid.data());

@@ -85,11 +85,11 @@ void fill_near_lists(Exec& exec, const std::uint32_t* near_start, const std::uin
   for (const ClosestGridSize& size : out.size) kept += size.near_points;
   out.near = exec.buffer<std::uint32_t>(kept);
   out.near_start = exec.buffer<std::uint32_t>(blocks + 1);
-  launch(exec, "write_starts", write_starts, {blocks_for(std::size_t(blocks) + 1, 256), 256},
-         near_start, used, blocks, out.near_start.data());
+  launch(exec, "write_starts", write_starts, shape_for(std::size_t(blocks) + 1, 256), near_start,
+         used, blocks, out.near_start.data());
   if (points == 0) return;
-  launch(exec, "keep_candidates", keep_candidates, {blocks_for(points, 256), 256}, near, used,
-         points, out.near.data());
+  launch(exec, "keep_candidates", keep_candidates, shape_for(points, 256), near, used, points,
+         out.near.data());
 }
 
 }  // namespace gpureg::cuda

@@ -53,8 +53,8 @@ Hypotheses fit_hypotheses(Exec& exec, const Matches& matches, const Quadruples& 
   out.valid = exec.buffer<std::uint8_t>(total);
   out.count = exec.filled<std::uint32_t>(pairs, 0);
   if (total == 0) return out;
-  launch(exec, "fit", fit, {blocks_for(total, 128), 128}, quadruples.segments.on_device.data(),
-         pairs, quadruples.id.data(), matches.room.on_device.data() + quadruples.first_pair,
+  launch(exec, "fit", fit, shape_for(total, 128), quadruples.segments.on_device.data(), pairs,
+         quadruples.id.data(), matches.room.on_device.data() + quadruples.first_pair,
          matches.pairs.data(), matches.count.data() + quadruples.first_pair, options.seed,
          out.pose.data(), out.valid.data(), out.count.data());
   return out;

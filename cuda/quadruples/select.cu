@@ -75,8 +75,8 @@ DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uin
   const auto ties = exec.buffer<std::uint32_t>(total);
   const auto tie_count = exec.filled<std::uint32_t>(1, 0);
   if (total > 0) {
-    launch(exec, "list_ties", list_ties, {blocks_for(total, kThreads), kThreads}, batch,
-           ties.data(), tie_count.data(), residual.data());
+    launch(exec, "list_ties", list_ties, shape_for(total, kThreads), batch, ties.data(),
+           tie_count.data(), residual.data());
     const unsigned full = static_cast<unsigned>(exec.multiprocessors()) * 8;
     launch(exec, "measure_ties", measure_ties, {full, kThreads}, batch, ties.data(),
            tie_count.data(), residual.data());

@@ -25,9 +25,9 @@ std::vector<Found> find_points(cuda::Exec& exec, const cuda::CudaCloud& cloud,
                                const std::vector<Vec3>& locations, float max_squared) {
   const auto on_device = exec.upload(locations);
   const auto out = exec.buffer<Found>(locations.size());
-  cuda::launch(exec, "find", find, {cuda::blocks_for(locations.size(), 128), 128},
-               cloud.view_on_device, cloud.summaries, on_device.data(),
-               static_cast<std::uint32_t>(locations.size()), max_squared, out.data());
+  cuda::launch(exec, "find", find, cuda::shape_for(locations.size(), 128), cloud.view_on_device,
+               cloud.summaries, on_device.data(), static_cast<std::uint32_t>(locations.size()),
+               max_squared, out.data());
   return host(exec, out.data(), locations.size());
 }
 
