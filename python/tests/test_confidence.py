@@ -19,17 +19,10 @@ sys.path.insert(0, str(ROOT / "bench/accuracy"))
 import fit_confidence
 
 HEADER = (ROOT / "src/confidence/confidence_model.hpp").read_text()
-SIDES = (
-    "overlap",
-    "overlap_any_normal",
-    "normal_weighted_overlap",
-    "observed",
-    "free_space_violation",
-    "occluded",
-    "near_surface",
-    "front_violation_near",
-    "front_violation_far",
-    "behind_surface",
+SIDES = tuple(
+    name.removeprefix("source_")
+    for name in vars(gpureg.PoseEvidence)
+    if name.startswith("source_") and name != "source_residual"
 )
 ALONE = ("match_inliers", "match_support", "information_eigenvalues")
 
