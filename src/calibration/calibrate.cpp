@@ -6,6 +6,7 @@
 
 #include "calibration/halves.hpp"
 #include "calibration/labels.hpp"
+#include "common/fnv1a.hpp"
 #include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "gpureg/calibration.hpp"
@@ -227,13 +228,13 @@ class Calibration {
 }  // namespace
 
 std::uint64_t cloud_fingerprint(const PointCloudView& cloud) {
-  std::uint64_t hash = 14695981039346656037ull;  // FNV-1a, of words
+  Fnv1a hash;
   for (std::size_t k = 0; k < cloud.size; ++k) {
     std::uint32_t words[3];
     std::memcpy(words, cloud.points + k * cloud.point_stride, sizeof words);
-    for (const std::uint32_t word : words) hash = (hash ^ word) * 1099511628211ull;
+    for (const std::uint32_t word : words) hash.add(word);
   }
-  return hash;
+  return hash.value();
 }
 
 void CalibrationOptions::validate() const {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <map>
 
+#include "common/fnv1a.hpp"
 #include "math/exponential.hpp"
 
 namespace gpureg::loop_closure {
@@ -68,10 +69,9 @@ double covered(const Coarse& a, const Coarse& b, const pose_graph::Pose& b_from_
   return sum;
 }
 
-/// FNV-1a over 64-bit words.
-struct Hash {
-  std::uint64_t value = 14695981039346656037ull;
-  void add(std::uint64_t word) { value = (value ^ word) * 1099511628211ull; }
+/// Of 64-bit words.
+struct Hash : Fnv1a {
+  using Fnv1a::add;
   void add(double v) {
     std::uint64_t word;
     std::memcpy(&word, &v, sizeof word);
@@ -119,7 +119,7 @@ std::uint64_t fingerprint_of(const PreparedCloud& cloud) {
     hash.add(v);
   hash.add(static_cast<std::uint64_t>(options.depth_maps));
   hash.add(static_cast<std::uint64_t>(cloud.feature_dimension()));
-  return hash.value;
+  return hash.value();
 }
 
 double expected_overlap(const Coarse& a, const Coarse& b, const pose_graph::Pose& b_from_a,

@@ -1,28 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_closure/saving/saved_state.hpp"
 
-#include <cstring>
 #include <type_traits>
 
+#include "files/envelope.hpp"
 #include "gpureg/error.hpp"
 #include "loop_closure/saving/check_state.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
 
-// Layout: kMagic, version, size and checksum of the payload, payload. All numbers little-endian, as
-// every processor that the library runs on.
-constexpr char kMagic[8] = {'g', 'p', 'u', 'r', 'e', 'g', 'L', 'C'};
-constexpr std::uint32_t kVersion = 2;
-constexpr std::size_t kHeader = sizeof kMagic + sizeof kVersion + 2 * sizeof(std::uint64_t);
-
-/// FNV-1a.
-std::uint64_t checksum(const char* data, std::size_t size) {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (std::size_t k = 0; k < size; ++k)
-    hash = (hash ^ static_cast<unsigned char>(data[k])) * 1099511628211ull;
-  return hash;
-}
+constexpr files::BinaryKind kKind{"gpuregLC", 2, "saved state of a LoopCloser"};
 
 /// Appends values.
 class Writer {
@@ -43,35 +31,23 @@ class Writer {
 };
 
 /// Reads them back in the same order.
-class Reader {
+class Reader : public files::PayloadReader {
  public:
   static constexpr bool kReads = true;
-  Reader(const char* data, std::size_t size, const std::string& path)
-      : data_(data), size_(size), path_(path) {}
+  using PayloadReader::PayloadReader;
   template <typename T>
   void value(T& v) {
     static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
-    if (size_ - at_ < sizeof v) fail();
-    std::memcpy(&v, data_ + at_, sizeof v);
-    at_ += sizeof v;
+    values(&v, 1);
   }
   /// Every element takes a byte or more.
   template <typename T>
   std::uint64_t count(T&) {
     std::uint64_t n = 0;
     value(n);
-    if (n > size_ - at_) fail();
+    if (n > left()) fail();
     return n;
   }
-  bool at_end() const { return at_ == size_; }
-  [[noreturn]] void fail() const {
-    throw IoError(path_ + ": its content contradicts itself; the file is damaged");
-  }
-
- private:
-  const char* data_;
-  std::size_t size_, at_ = 0;
-  const std::string& path_;
 };
 
 // One function for both directions: what is written is what is read.
@@ -245,45 +221,21 @@ void all(File& file, State& state) {
   flag(file, state.poses_changed);
 }
 
-template <typename T>
-T number_at(const std::string& content, std::size_t at) {
-  T v;
-  std::memcpy(&v, content.data() + at, sizeof v);
-  return v;
-}
-
 }  // namespace
 
 std::string to_bytes(const State& state) {
   Writer file;
   all(file, const_cast<State&>(state));  // the writer only reads it
-  const std::uint64_t size = file.bytes.size();
-  const std::uint64_t sum = checksum(file.bytes.data(), file.bytes.size());
-  std::string out(kMagic, sizeof kMagic);
-  out.append(reinterpret_cast<const char*>(&kVersion), sizeof kVersion);
-  out.append(reinterpret_cast<const char*>(&size), sizeof size);
-  out.append(reinterpret_cast<const char*>(&sum), sizeof sum);
-  return out + file.bytes;
+  files::Envelope envelope;
+  envelope.add(file.bytes);
+  return envelope.header(kKind) + file.bytes;
 }
 
 State from_bytes(const std::string& content, const std::string& path) {
-  if (content.size() < sizeof kMagic || std::memcmp(content.data(), kMagic, sizeof kMagic) != 0)
-    throw IoError(path + " is no saved state of a LoopCloser");
-  if (content.size() < kHeader) throw IoError(path + " is truncated");
-  const auto version = number_at<std::uint32_t>(content, sizeof kMagic);
-  if (version != kVersion)
-    throw IoError(path + " has version " + std::to_string(version) + ", this library reads " +
-                  std::to_string(kVersion));
-  const auto size = number_at<std::uint64_t>(content, sizeof kMagic + sizeof kVersion);
-  const auto sum = number_at<std::uint64_t>(content, sizeof kMagic + sizeof kVersion + sizeof size);
-  if (size > content.size() - kHeader) throw IoError(path + " is truncated");
-  if (size < content.size() - kHeader) throw IoError(path + " is longer than its header says");
-  if (sum != checksum(content.data() + kHeader, static_cast<std::size_t>(size)))
-    throw IoError(path + " is damaged: its checksum does not match");
-  Reader file(content.data() + kHeader, static_cast<std::size_t>(size), path);
+  Reader file(files::payload_of(content, kKind, path), path);
   State state;
   all(file, state);
-  if (!file.at_end()) file.fail();
+  if (file.left() > 0) file.fail();
   try {
     check_state(state);
   } catch (const InvalidArgument& error) {
