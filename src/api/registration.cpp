@@ -69,8 +69,9 @@ std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
       naming(k, [&] {
         const OwnedRows& rows = owners[k].emplace(raw[k], knowledge[k].model, options);
         raw[k] = rows.kept.cloud();
+        knowledge[k].flat = rows.extruded.plane().exists();
         // The origin of the frame may be below the scanner.
-        if (rows.extruded.plane().exists() && !knowledge[k].viewpoints && raw[k].viewpoints)
+        if (knowledge[k].flat && !knowledge[k].viewpoints && raw[k].viewpoints)
           for (int axis = 0; axis < 3; ++axis)
             knowledge[k].origin[axis] = -static_cast<double>(raw[k].viewpoints[axis]);
       });

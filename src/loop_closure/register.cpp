@@ -23,8 +23,10 @@ std::vector<RegistrationMode> modes_of(const RegistrationResult& result) {
   return {only};
 }
 
-Mode mode_of(const RegistrationMode& given, const CorrespondenceMoments& moments,
+/// @param result that `given` is a mode of.
+Mode mode_of(const RegistrationMode& given, const RegistrationResult& result,
              const Options& options) {
+  const CorrespondenceMoments& moments = result.source_moments;
   Mode mode;
   mode.target_from_source = given.target_from_source;
   mode.confidence = std::min(given.confidence, kCertain);
@@ -34,8 +36,8 @@ Mode mode_of(const RegistrationMode& given, const CorrespondenceMoments& moments
   if (options.information_from_correspondences && moments.count > 0)
     mode.information = moments.information_open3d();
   else
-    mode.information =
-        reconstruction::edge_information(given, centre, options.noise, options.information_unit);
+    mode.information = reconstruction::edge_information(given, centre, options.noise,
+                                                        options.information_unit, result.flat);
   // A lever of kilometres to the origin of the cloud makes a rotation as certain.
   const double largest = mode.information.cwiseAbs().maxCoeff();
   if (largest > pose_graph::kLargestInformation)
@@ -73,7 +75,7 @@ LoopRecord record_of(FragmentId source, FragmentId target, const RegistrationRes
   for (const RegistrationMode& mode : modes) {
     if (record.modes.size() >= options.modes) break;
     if (record.modes.empty() || mode.confidence >= kMinAlternative)
-      record.modes.push_back(mode_of(mode, result.source_moments, options));
+      record.modes.push_back(mode_of(mode, result, options));
   }
   choose_mode(record, 0);
   return record;

@@ -23,13 +23,14 @@ double inflation(double weak, double typical, double most) {
 
 /// Covariance at the centre of the overlap, rotation first, axes of the target.
 Matrix6d covariance_at_centre(const PoseEvidence& evidence, const EdgeNoiseOptions& noise,
-                              double unit) {
+                              double unit, bool flat) {
   Matrix6d covariance = Matrix6d::Zero();
   covariance.topLeftCorner<3, 3>().diagonal().setConstant(square(noise.rotation * M_PI / 180));
   covariance.bottomRightCorner<3, 3>().diagonal().setConstant(square(noise.translation));
   const auto& eigenvalues = evidence.information_eigenvalues;
   if (!(eigenvalues[5] > 0)) return covariance;
-  const double typical = 0.5 * (eigenvalues[2] + eigenvalues[3]);
+  // Of 2-D scans the first three are of the motions in the plane, the others say nothing.
+  const double typical = flat ? eigenvalues[1] : 0.5 * (eigenvalues[2] + eigenvalues[3]);
   const double most = square(noise.max_translation / noise.translation);
   // Only one direction is known: where a second one is weak as well, all directions count less.
   covariance *= inflation(eigenvalues[1], typical, most);
@@ -47,8 +48,9 @@ Matrix6d covariance_at_centre(const PoseEvidence& evidence, const EdgeNoiseOptio
 
 pose_graph::UnalignedMatrix6d edge_information(const RegistrationMode& mode,
                                                const Eigen::Vector3d& source_centre,
-                                               const EdgeNoiseOptions& noise, double unit) {
-  const Matrix6d covariance = covariance_at_centre(mode.evidence, noise, unit);
+                                               const EdgeNoiseOptions& noise, double unit,
+                                               bool flat) {
+  const Matrix6d covariance = covariance_at_centre(mode.evidence, noise, unit, flat);
   // An error d about the centre c of the target is the residual e = Ad(T^-1 Trans(c)) d.
   const pose_graph::Pose target_from_source{mode.target_from_source.linear(),
                                             mode.target_from_source.translation()};

@@ -10,9 +10,12 @@ namespace gpureg::reconstruction {
 /// @param mode pose and evidence; without eigenvalues the noise is isotropic.
 /// @param source_centre of the overlap, in the source's frame.
 /// @param unit Options::information_unit.
+/// @param flat RegistrationResult::flat: only the motions in the plane tell typical ones from weak
+/// ones.
 pose_graph::UnalignedMatrix6d edge_information(const RegistrationMode& mode,
                                                const Eigen::Vector3d& source_centre,
-                                               const EdgeNoiseOptions& noise, double unit);
+                                               const EdgeNoiseOptions& noise, double unit,
+                                               bool flat = false);
 
 /// Centre of the overlap in the source's frame; the origin where it is not known.
 Eigen::Vector3d overlap_centre(const RegistrationResult& result);

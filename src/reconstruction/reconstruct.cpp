@@ -98,7 +98,7 @@ PairGraph graph_of_pairs(std::size_t scans, const std::vector<Pair>& pairs,
     const Eigen::Vector3d centre = overlap_centre(results[k]);
     const auto information = [&](const Candidate& candidate) {
       return edge_information(modes[candidate.mode], centre, options.noise,
-                              options.information_unit);
+                              options.information_unit, results[k].flat);
     };
     pose_graph::Edge edge;
     edge.source = pairs[k].source;

@@ -237,9 +237,9 @@ void UnknownViewpoints::decide(std::size_t cloud, PointsAndNormals surface,
                              kGraphRadius * options_.normal_radius, threads());
     const Vec3 of_rows = origin_of_rows(known);
     const Vec3 local = of_rows - Vec3{origin[0], origin[1], origin[2]};
-    out.sides = known.normals ? check_given_sides(graph)
+    out.sides = known.normals ? check_given_sides(graph, !known.flat)
                               : infer_sides(graph, local, raw_[cloud], of_rows,
-                                            asks ? &*spread_[cloud] : nullptr);
+                                            asks ? &*spread_[cloud] : nullptr, !known.flat);
   }
   out.made = true;
 }

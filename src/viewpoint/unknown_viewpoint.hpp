@@ -18,6 +18,7 @@ struct CloudKnowledge {
   bool infer_viewpoint;                ///< PointCloudView::infer_viewpoint
   bool model;                          ///< PointCloudView::model
   double origin[3];                    ///< of the rows in the cloud's frame
+  bool flat = false;                   ///< a scan of a 2-D scanner, in layers
 };
 
 template <typename View>

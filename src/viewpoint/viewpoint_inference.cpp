@@ -204,14 +204,14 @@ bool is_scanner(const SpacingSpread& spread) {
 }
 
 InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud& rows,
-                          Vec3 origin_of_rows, const SpacingSpread* spread) {
+                          Vec3 origin_of_rows, const SpacingSpread* spread, bool may_be_model) {
   InferredSides out;
   if (graph.edges() < kMinEdges || (spread && is_scanner(*spread))) {
     if (spread) out.source = ViewpointSource::origin;
     return out;
   }
   auto [best, along] = BothSides(graph);
-  if (is_closed(graph, along)) {
+  if (may_be_model && is_closed(graph, along)) {
     if (!graph.outwards(along)) flip(along);
     return {ViewpointSource::model, std::move(along), true};
   }
@@ -225,11 +225,11 @@ InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud
   return out;
 }
 
-InferredSides check_given_sides(const SurfaceGraph& graph) {
+InferredSides check_given_sides(const SurfaceGraph& graph, bool may_be_model) {
   InferredSides out{ViewpointSource::normals, {}, true};
   const SurfaceGraph::Signs given(graph.points().size(), 1);
   const double contradiction = graph.contradiction(given);
-  if (graph.edges() >= kMinEdges && contradiction <= kModelContradiction &&
+  if (may_be_model && graph.edges() >= kMinEdges && contradiction <= kModelContradiction &&
       graph.flux(given) <= kClosedFlux && graph.outwards(given))
     out.source = ViewpointSource::model;
   if (graph.edges() < kMinEdges || contradiction < kContradictory) return out;

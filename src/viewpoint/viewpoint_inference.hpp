@@ -22,8 +22,9 @@ struct InferredSides {
 /// @param origin of the cloud's frame, relative to the points.
 /// @param rows of the input.
 /// @param spread of the rows about the origin; null: the origin is known not to be a viewpoint.
+/// @param may_be_model false: a closed surface is that of a room, as a 2-D scanner sees it.
 InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud& rows,
-                          Vec3 origin_of_rows, const SpacingSpread* spread);
+                          Vec3 origin_of_rows, const SpacingSpread* spread, bool may_be_model);
 
 /// True where the rows are spaced as a scanner at the origin spaces them: no surface has to tell.
 bool is_scanner(const SpacingSpread& spread);
@@ -31,6 +32,6 @@ bool is_scanner(const SpacingSpread& spread);
 /// Sides of a cloud whose input normals gave the graph its signs: they are kept, unless they
 /// contradict each other far more than sides from a viewpoint or along the surface do. Those then
 /// replace them, with the sign that most of the input normals have.
-InferredSides check_given_sides(const SurfaceGraph& graph);
+InferredSides check_given_sides(const SurfaceGraph& graph, bool may_be_model);
 
 }  // namespace gpureg

@@ -107,6 +107,21 @@ TEST(FlatScans, ATiltedPlaneIsOne) {
   }
 }
 
+// The outline of a room that the scanner sees all of is closed, as the surface of a part is.
+TEST(FlatScans, AClosedRoomIsNoModel) {
+  const Eigen::Isometry3d pose = test::pose_in_plan(-1.1, -0.7, 1.4);
+  const Points scan = test::FloorPlan2d().scan(pose, 3);
+  const Context context = Context::cpu(2);
+  const PrepareOptions options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  const auto viewpoint_of = [&](const Points& points) {
+    return prepare(context, PointCloudView(points), options).statistics().viewpoint;
+  };
+  EXPECT_EQ(viewpoint_of(scan), ViewpointSource::origin) << to_string(viewpoint_of(scan));
+  EXPECT_NE(viewpoint_of(moved(scan, pose)), ViewpointSource::model);
+  const RegistrationResult result = registered(scan, first_scan());
+  EXPECT_TRUE(result.aligned()) << explain(result);
+}
+
 TEST(FlatScans, OtherCloudsAreNone) {
   EXPECT_FALSE(plane_of(patch(4, 3, 5000, 0, true))) << "a floor without noise";
   EXPECT_FALSE(plane_of(patch(4, 3, 5000, 0, false))) << "a floor without noise, at random";

@@ -177,6 +177,18 @@ TEST(EdgeNoise, IsWeakAlongACorridor) {
   EXPECT_NEAR(std::sqrt(covariance(4, 4)), noise.translation, 0.1 * noise.translation);
 }
 
+TEST(EdgeNoise, OfAScanInAPlaneIsByItsMotionsInThePlane) {
+  RegistrationMode mode;
+  mode.evidence.information_eigenvalues = {90, 100, 2000, 2191, 2191, 2191};
+  mode.evidence.weakest_direction = {0, 0, 0, 1, 0, 0};
+  const reconstruction::EdgeNoiseOptions noise;
+  const pose_graph::Matrix6d covariance =
+      reconstruction::edge_information(mode, Eigen::Vector3d::Zero(), noise, 1.0, true).inverse();
+  // A rotation moves far points by metres, and nothing holds what a scan cannot do.
+  for (int k = 3; k < 6; ++k)
+    EXPECT_NEAR(std::sqrt(covariance(k, k)), noise.translation, 0.1 * noise.translation);
+}
+
 TEST(EdgeNoise, AppliesAtTheCentreOfTheOverlap) {
   RegistrationMode mode;
   std::mt19937 random(3);

@@ -62,15 +62,17 @@ Islands islands_of(const Reconstruction& map) {
 }
 
 /// @param source_centre of the overlap.
+/// @param flat RegistrationResult::flat.
 void suggest(const Pair& pair, const RegistrationMode& mode, const Eigen::Vector3d& source_centre,
-             const Islands& islands, const Options& options, Between& out) {
+             bool flat, const Islands& islands, const Options& options, Between& out) {
   const std::uint32_t source = islands.of_scan[pair.source], target = islands.of_scan[pair.target];
   if (source == target || source == kNoIsland || target == kNoIsland) return;
   Suggestion one;
   one.source = pair.source;
   one.target = pair.target;
   one.target_from_source = mode.target_from_source;
-  one.information = edge_information(mode, source_centre, options.noise, options.information_unit);
+  one.information =
+      edge_information(mode, source_centre, options.noise, options.information_unit, flat);
   one.a = std::min(source, target);
   one.b = std::max(source, target);
   const UnalignedIsometry3d& of_source = islands.island_from_scan[pair.source];
@@ -95,14 +97,14 @@ Between suggestions(const std::vector<Pair>& pairs, const std::vector<Registrati
     const Eigen::Vector3d centre = overlap_centre(results[k]);
     for (const RegistrationMode& mode : results[k].modes)
       if (mode.confidence >= kLeastSuggested)
-        suggest(pairs[k], mode, centre, islands, options, out);
+        suggest(pairs[k], mode, centre, results[k].flat, islands, options, out);
   }
   for (const AuditedPair& pair : refined) {
     if (pair.shift == 0) continue;
     RegistrationMode mode;
     mode.target_from_source = pair.refined;
     mode.confidence = 0.5;
-    suggest({pair.source, pair.target}, mode, pair.overlap_centre, islands, options, out);
+    suggest({pair.source, pair.target}, mode, pair.overlap_centre, false, islands, options, out);
   }
   return out;
 }
