@@ -18,9 +18,10 @@ namespace gpureg::cli {
 namespace {
 
 // CLI11 takes -4 for an unsigned number and wraps it around.
-std::string check_natural(const std::string& text) {
+std::string check_natural(const std::string& text, const std::string& zero) {
   if (text.empty() || text.find_first_not_of("0123456789") != std::string::npos)
-    return "'" + text + "' is no whole number";
+    return "'" + text + "', expected a whole number, 0 or more" +
+           (zero.empty() ? "" : " (0: " + zero + ")");
   errno = 0;
   std::strtoull(text.c_str(), nullptr, 10);
   return errno == 0 ? "" : text + " is too large";
@@ -109,8 +110,9 @@ Option& Option::one_of(const std::vector<std::string>& words) {
   return *this;
 }
 
-Option& Option::natural() {
-  option_->check(CLI::Validator(&check_natural, "", "natural number"));
+Option& Option::natural(const std::string& zero) {
+  option_->check(CLI::Validator(
+      [zero](const std::string& text) { return check_natural(text, zero); }, "", "natural number"));
   return *this;
 }
 

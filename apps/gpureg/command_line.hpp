@@ -28,7 +28,8 @@ class Option {
   Option& show_default(const std::string& text);
   Option& type_name(const std::string& text);
   Option& one_of(const std::vector<std::string>& words);
-  Option& natural();  ///< of unsigned numbers: refuses a sign, which CLI11 wraps around
+  /// Of unsigned numbers: refuses a sign, which CLI11 wraps around. zero: what 0 stands for.
+  Option& natural(const std::string& zero = "");
   Option& between(double low, double high);
   Option& between(unsigned low, unsigned high);
   Option& not_negative();

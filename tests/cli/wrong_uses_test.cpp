@@ -44,6 +44,16 @@ PointCloud plane() {
   return cloud;
 }
 
+/// The room beside four others.
+PointCloud house() {
+  PointCloud cloud = room_scan(0);
+  for (int k = 1; k < 5; ++k)
+    for (const Eigen::Vector3f& p :
+         room_scan(k, Eigen::Vector3f(1.6f, 0.5f + 0.1f * k, 1.3f)).points)
+      cloud.points.emplace_back(p + Eigen::Vector3f(15.f * k, 0, 0));
+  return cloud;
+}
+
 std::string rows_of(const Eigen::Matrix4d& pose) {
   std::ostringstream text;
   text.precision(17);
@@ -68,6 +78,8 @@ class WrongUses : public testing::TestWithParam<Use> {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     PointCloud nans = a, one, line;
     for (Eigen::Vector3f& p : nans.points) p.x() = nan;
+    PointCloud mostly_nan = nans;
+    std::copy_n(a.points.begin(), 3, mostly_nan.points.begin());
     one.points = {a.points.front()};
     for (int k = 0; k < 3000; ++k)
       line.points.emplace_back(0.002f * static_cast<float>(k), 0.f, 0.f);
@@ -80,6 +92,8 @@ class WrongUses : public testing::TestWithParam<Use> {
                                                          {"sticks.ply", sticks()},
                                                          {"plane.ply", plane()},
                                                          {"nan.ply", nans},
+                                                         {"mostly_nan.ply", mostly_nan},
+                                                         {"house.ply", house()},
                                                          {"one.ply", one},
                                                          {"empty.ply", {}},
                                                          {"line.ply", line}};
@@ -196,7 +210,16 @@ INSTANTIATE_TEST_SUITE_P(
         Use{"NotANumber",
             align("nan.ply", "a.ply"),
             1,
-            {"not finite, dropped", "the source has no usable points"}},
+            {"not finite, dropped", "the source has no usable points",
+             "of the source are not finite", "try      points with coordinates"}},
+        Use{"MostlyNotANumber",
+            align("a.ply", "mostly_nan.ply"),
+            1,
+            {"the target has 3 usable points", "of the target are not finite"}},
+        Use{"NotANumberInAMap",
+            joined({"locate", "mostly_nan.ply", "a.ply"}, kSmall),
+            1,
+            {"mostly_nan.ply: ", "points are not finite"}},
         Use{"OnePoint", align("a.ply", "one.ply"), 1, {"the target has 1 usable points"}},
         Use{"ALine",
             align("a.ply", "line.ply"),
@@ -246,20 +269,27 @@ INSTANTIATE_TEST_SUITE_P(
         Use{"AnInvertedPose",
             align("a.ply", "b.ply", with("--initial", "inverse.txt")),
             1,
-            {"target_from_source, not its inverse"}},
+            {"try      the pose looks inverted: its inverse has a confidence of ",
+             "expected target_from_source"}},
         Use{"APoseInMillimetres",
             align("a.ply", "b.ply", with("--initial", "millimetres.txt")),
             1,
             {"no_candidate, no pose brings points of both clouds together",
              "in the unit of the clouds?"}},
-        Use{"MapAndScanExchanged",
+        Use{"AMapInMillimetres",
             joined({"locate", "a.ply", "millimetres.ply"}, kSmall),
             2,
             {"millimetres"}},
+        Use{"MapAndScanExchanged",
+            joined({"locate", "house.ply", "b.ply"}, kSmall),
+            1,
+            {"status   in_question: only ", "the scan extends over 6",
+             "is the map the last argument"}},
         Use{"AnotherPlace",
             joined({"locate", "sticks.ply", "a.ply"}, kSmall),
             1,
-            {"not_found", "is the scan of this place, in the unit of the map"}},
+            {"not_found", "is the scan of this place, in the unit of the map",
+             "sizes    the scan extends over 10", ", the map over "}},
         // Words.
         Use{"AnOptionMisspelt",
             align("a.ply", "b.ply", {"--voxelsize", "0.1"}),
@@ -273,12 +303,12 @@ INSTANTIATE_TEST_SUITE_P(
         Use{"NegativeThreads",
             align("a.ply", "b.ply", with("--threads", "-1")),
             2,
-            {"--threads: '-1' is no whole number"}},
+            {"--threads: '-1', expected a whole number, 0 or more (0: all)"}},
         Use{"AllThreads", align("a.ply", "b.ply", with("--threads", "0")), 0, {"aligned"}},
         Use{"ASeedOfLetters",
             align("a.ply", "b.ply", with("--seed", "first")),
             2,
-            {"--seed: 'first' is no whole number"}}),
+            {"--seed: 'first', expected a whole number, 0 or more"}}),
     [](const testing::TestParamInfo<Use>& use) { return std::string(use.param.name); });
 
 }  // namespace

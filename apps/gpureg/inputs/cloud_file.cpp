@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "inputs/cloud_file.hpp"
 
+#include <algorithm>
 #include <iostream>
 
 #include "gpureg/io.hpp"
@@ -20,6 +21,19 @@ void print_note(const std::string& path, const std::string& what, int& count) {
   if (what.empty() || ++count > kShown) return;
   std::cerr << "gpureg: note: " << path << ": " << what
             << (count == kShown ? "; further files are not named" : "") << std::endl;
+}
+
+/// Of organised clouds half of the points may be missing; where nearly all are, it is a mistake.
+void note_not_finite(const PointCloud& cloud, const std::string& path) {
+  static int count = 0;
+  const auto missing = static_cast<std::size_t>(
+      std::count_if(cloud.points.begin(), cloud.points.end(),
+                    [](const Eigen::Vector3f& p) { return !p.allFinite(); }));
+  if (10 * missing >= 9 * cloud.points.size() && missing > 0)
+    print_note(
+        path,
+        grouped(missing) + " of its " + grouped(cloud.points.size()) + " points are not finite",
+        count);
 }
 
 void note_strange(const std::string& what, const std::string& path) {
@@ -42,6 +56,7 @@ PointCloud read_cloud(const std::string& path, double spacing, MeshNote note) {
     if (note == MeshNote::none) return cloud;
     note_coarse(cloud, path);
     note_strange(strange, path);
+    note_not_finite(cloud, path);
     return cloud;
   }
   const io::SurfaceMesh mesh = io::read_mesh(path);

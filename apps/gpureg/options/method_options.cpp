@@ -55,7 +55,9 @@ void MethodOptions::add_to(Verb verb) {
   verb.option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
       .one_of({"auto", "cpu", "cuda"})
       .show_default();
-  verb.option("--threads", threads, "Threads of the CPU backend; 0: all").natural().show_default();
+  verb.option("--threads", threads, "Threads of the CPU backend; 0: all")
+      .natural("all")
+      .show_default();
   verb.option("--quality", quality,
               "From 0, the fastest, to 10, the highest recall; of the preset default")
       .between(0u, kHighestQuality)

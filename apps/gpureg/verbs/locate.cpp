@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -67,12 +69,69 @@ std::vector<LocatedScan> scans_in(const LocateRun& o) {
   return out;
 }
 
-void print(const std::string& file, const LocateResult& result) {
-  std::cout << "scan     " << file << ": " << grouped(result.scan_points) << " points, "
+Eigen::Vector3d sides_of(const PointCloud& cloud) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : cloud.points)
+    if (p.allFinite()) box.extend(p);
+  return box.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(box.sizes().cast<double>());
+}
+
+std::string text_of(const Eigen::Vector3d& sides) {
+  return significant(sides.x(), 3) + " x " + significant(sides.y(), 3) + " x " +
+         significant(sides.z(), 3);
+}
+
+/// Share of the scan that lies on the map at the first pose.
+double share_on_map(const LocateResult& result) {
+  return result.poses.front().verification.evidence.source_overlap;
+}
+
+/// Found, with enough of the scan on the map. A scan that is larger than the map may be the map.
+bool is_well(const LocateResult& result) {
+  constexpr double kMostlyElsewhere = 0.3;
+  return result.status == LocateStatus::found && share_on_map(result) >= kMostlyElsewhere;
+}
+
+/// A scan and the map that it was looked for in.
+struct Search {
+  LocatedScan scan;
+  LocateResult result;
+  Eigen::Vector3d scan_sides, map_sides;  ///< of the boxes around their points
+
+  std::string sides() const {
+    return "the scan extends over " + text_of(scan_sides) + ", the map over " + text_of(map_sides);
+  }
+  bool scan_is_larger() const { return scan_sides.maxCoeff() > map_sides.maxCoeff(); }
+
+  /// What is to be asked before the place is believed; empty: nothing.
+  std::string question() const {
+    constexpr double kLittle = 0.05;
+    if (is_well(result)) return "";
+    if (result.status != LocateStatus::found) return "";
+    if (!scan_is_larger() && share_on_map(result) >= kLittle) return "";
+    return "only " + percent(share_on_map(result)) + " % of the scan lies on the map, and " +
+           sides() + ": is the map the last argument, and are both in one unit?";
+  }
+  /// In words of LocateStatus, but for a place in question.
+  std::string status() const {
+    return question().empty() ? localization::to_string(result.status) : "in_question";
+  }
+  bool found() const { return status() == localization::to_string(LocateStatus::found); }
+};
+
+void print(const Search& search) {
+  const LocateResult& result = search.result;
+  std::cout << "scan     " << search.scan.path << ": " << grouped(result.scan_points) << " points, "
             << result.tiles << (result.tiles == 1 ? " tile\n" : " tiles\n") << "status   "
-            << localization::to_string(result.status)
-            << ", not at any of these poses with probability "
-            << fixed(result.absent_probability, 3) << "\n";
+            << search.status();
+  if (const std::string question = search.question(); !question.empty())
+    std::cout << ": " << question << "\n";
+  else
+    std::cout << ", not at any of these poses with probability "
+              << fixed(result.absent_probability, 3) << "\n";
+  if (result.status == LocateStatus::not_found)
+    std::cout << "sizes    " << search.sides()
+              << (search.scan_is_larger() ? ": is the map the last argument?\n" : "\n");
   constexpr std::size_t kShown = 3;
   for (std::size_t k = 0; k < std::min(kShown, result.poses.size()); ++k) {
     const LocatedPose& pose = result.poses[k];
@@ -81,13 +140,6 @@ void print(const std::string& file, const LocateResult& result) {
               << percent(pose.verification.inlier_ratio) << " %, map_from_scan\n";
     std::cout << pose_text(pose.map_from_scan.matrix());
   }
-  constexpr double kLittle = 0.05;
-  if (result.status == LocateStatus::found &&
-      result.poses.front().verification.inlier_ratio < kLittle)
-    std::cerr << "gpureg: note: only " << percent(result.poses.front().verification.inlier_ratio)
-              << " % of " << file
-              << " lies on the map under this pose: is it the scan, and the map the last argument?"
-              << std::endl;
 }
 
 std::vector<PointCloud> read_scans(const LocateRun& o, const Context& context,
@@ -116,8 +168,7 @@ std::vector<LocateResult> locate_all(const LocateRun& o, const Context& context,
 }
 
 void write_json(const LocateRun& o, const Context& context, const PreparedMap& map,
-                const LocateOptions& options, const std::vector<LocateResult>& results,
-                double seconds) {
+                const LocateOptions& options, const std::vector<Search>& searches, double seconds) {
   Json head;
   head["gpureg"] = "locate";
   head["environment"] = environment(context);
@@ -125,10 +176,13 @@ void write_json(const LocateRun& o, const Context& context, const PreparedMap& m
   head["map"] = {{"file", o.map()}, {"points", map.size()}, {"tiles", map.tiles()}};
   head["seconds"] = seconds;
   head["peak_memory_mib"] = peak_memory_mib();
-  write_document(o.json, head, {"scans", results.size(), [&](std::size_t k) {
-                                  Json json = {{"file", o.scans[k].path},
-                                               {"name", o.scans[k].name}};
-                                  json.update(to_json(results[k], o.scans[k].path));
+  write_document(o.json, head, {"scans", searches.size(), [&](std::size_t k) {
+                                  const Search& search = searches[k];
+                                  Json json = {{"file", search.scan.path},
+                                               {"name", search.scan.name}};
+                                  json.update(to_json(search.result, search.scan.path));
+                                  json["status"] = search.status();
+                                  if (!search.found()) json["sizes"] = search.sides();
                                   return json;
                                 }});
 }
@@ -168,17 +222,23 @@ int run(LocateRun o) {
   const std::vector<LocateResult> results = locate_all(o, context, scans, map, options);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  bool all = true;
+  bool all = true, some_lost = false;
+  std::vector<Search> searches;
+  const Eigen::Vector3d map_sides = std::all_of(results.begin(), results.end(), is_well)
+                                        ? Eigen::Vector3d::Zero()
+                                        : sides_of(map.cloud());
   for (std::size_t k = 0; k < results.size(); ++k) {
-    print(o.scans[k].path, results[k]);
-    all = all && results[k].status == LocateStatus::found;
+    searches.push_back({o.scans[k], results[k], sides_of(scans[k]), map_sides});
+    print(searches.back());
+    all = all && searches.back().found();
+    some_lost = some_lost || results[k].status != LocateStatus::found;
   }
-  if (!all)
+  if (some_lost)
     std::cout
         << "try      is the scan of this place, in the unit of the map, and the map sharp (its "
            "poses)? Then --up, --near, another --voxel-size\n";
   std::cout << "seconds  " << fixed(seconds, 2) << "\n";
-  if (!o.json.empty()) write_json(o, context, map, options, results, seconds);
+  if (!o.json.empty()) write_json(o, context, map, options, searches, seconds);
   return all ? kOk : kNoAlignment;
 }
 

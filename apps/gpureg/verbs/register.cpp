@@ -46,7 +46,8 @@ struct RegisterOptions {
   bool refine_initial = false, ignore_alternatives = false;
   ViewpointChoice source_viewpoint, target_viewpoint;
   UpChoice up;
-  std::string other_units, perhaps_other_units;  // questions about a pair that is not aligned
+  // Of a pair that is not aligned: questions, and what is known to be wrong.
+  std::string other_units, perhaps_other_units, inverted, not_finite;
 };
 
 std::string describe(const PrepareStatistics& s) {
@@ -63,8 +64,31 @@ std::string describe(const PrepareStatistics& s) {
                                  : "");
 }
 
+/// "20,000 of the 20,000 points of the source are not finite", of a pair that lacks points.
+std::string not_finite(const RegistrationResult& r, const PrepareStatistics& source,
+                       const PrepareStatistics& target) {
+  if (r.reason != RegistrationReason::too_few_source_points &&
+      r.reason != RegistrationReason::too_few_target_points &&
+      r.reason != RegistrationReason::too_few_points &&
+      r.reason != RegistrationReason::no_usable_features)
+    return "";
+  std::string text;
+  for (const auto& [name, cloud] : {std::pair("source", &source), std::pair("target", &target)})
+    if (2 * cloud->invalid_points > cloud->input_points)
+      text += (text.empty() ? "" : ", ") + grouped(cloud->invalid_points) + " of the " +
+              grouped(cloud->input_points) + " points of the " + name;
+  return text.empty() ? "" : text + " are not finite";
+}
+
+std::string explained(const RegisterOptions& o, const RegistrationResult& r) {
+  return explain(r) + (o.not_finite.empty() ? "" : ": " + o.not_finite);
+}
+
 /// A pose that was given, and brings next to nothing together, may be of another convention.
 std::string next_step(const RegisterOptions& o, RegistrationReason reason) {
+  if (!o.not_finite.empty())
+    return "points with coordinates: NaN stands for no return, or comes of a division by 0";
+  if (!o.inverted.empty()) return o.inverted;
   if (!o.initial.empty() && (reason == RegistrationReason::no_candidate ||
                              reason == RegistrationReason::too_little_overlap))
     return "is the pose target_from_source, not its inverse, and in the unit of the clouds?";
@@ -87,7 +111,7 @@ void print_reason(const RegisterOptions& o, const RegistrationResult& r) {
     std::cout << "\n";
     return;
   }
-  std::cout << ": " << to_string(r.reason) << ", " << explain(r) << "\n";
+  std::cout << ": " << to_string(r.reason) << ", " << explained(o, r) << "\n";
   if (const std::string next = next_step(o, r.reason); !next.empty())
     std::cout << "try      " << next << "\n";
 }
@@ -201,7 +225,7 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
   json["source"] = {{"file", o.source}, {"prepare", to_json(source.statistics())}};
   json["target"] = {{"file", o.target}, {"prepare", to_json(target.statistics())}};
   json["result"] = to_json(result, "target_from_source");
-  json["result"]["explanation"] = explain(result);
+  json["result"]["explanation"] = explained(o, result);
   json["result"]["advice"] = next_step(o, result.reason);
   json["result"]["information_redwood"] = to_json(result.source_moments.information_redwood());
   json["result"]["information_open3d"] = to_json(result.target_moments.information_open3d());
@@ -220,6 +244,18 @@ RegistrationResult verify(const RegisterOptions& o, const Context& context,
   return result_of(verify_poses(context, source, target, poses, options, verification),
                    options.min_confidence, static_cast<std::uint32_t>(source.size()),
                    static_cast<std::uint32_t>(target.size()));
+}
+
+/// What to say of poses that fit the better inverted. It looks at the inverses alone: little work.
+std::string inverted(RegisterOptions o, const Context& context, const PreparedCloud& source,
+                     const PreparedCloud& target, std::vector<UnalignedIsometry3d> poses,
+                     const RegistrationOptions& options, double confidence) {
+  for (UnalignedIsometry3d& pose : poses) pose = pose.inverse();
+  o.ignore_alternatives = true;
+  const RegistrationResult inverse = verify(o, context, source, target, poses, options);
+  if (!inverse.aligned() || inverse.score <= confidence) return "";
+  return "the pose looks inverted: its inverse has a confidence of " + fixed(inverse.score, 3) +
+         "; expected target_from_source, which moves points of " + o.source + " onto " + o.target;
 }
 
 /// Both clouds. A mesh is sampled at the spacing of the other cloud.
@@ -320,6 +356,9 @@ int run(RegisterOptions o) {
     // Parts of scenes differ by the ratios of feet, inches and centimetres, too.
     o.perhaps_other_units =
         question_units(source_cloud.view(), target_cloud.view(), kLeastUnitRatio);
+    o.not_finite = not_finite(result, source.statistics(), target.statistics());
+    if (!o.initial.empty() && source.size() > 0 && target.size() > 0)
+      o.inverted = inverted(o, context, source, target, initial, options, result.score);
   }
   if (o.initial.empty())
     print_report(o, context, source, target, result);
