@@ -101,7 +101,8 @@ struct Search {
   std::string sides() const {
     return "the scan extends over " + text_of(scan_sides) + ", the map over " + text_of(map_sides);
   }
-  bool scan_is_larger() const { return scan_sides.maxCoeff() > map_sides.maxCoeff(); }
+  /// By more than what a scan sees beyond the edge of a map.
+  bool scan_is_larger() const { return scan_sides.maxCoeff() > 2 * map_sides.maxCoeff(); }
 
   /// What is to be asked before the place is believed; empty: nothing.
   std::string question() const {
