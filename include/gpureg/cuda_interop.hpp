@@ -57,7 +57,8 @@ struct DevicePointCloudView {
 };
 
 /// prepare() for a cloud in device memory; the result equals that of the same cloud in host memory
-/// bit for bit.
+/// bit for bit, but for two things that are looked for in host memory only: scans of 2-D scanners
+/// are prepared as any other cloud, and stray points are kept.
 ///
 /// Work in `stream` reads the rows, after everything enqueued there before; work enqueued there
 /// later may change or free them. The call waits neither for the stream nor for other work of the

@@ -42,6 +42,7 @@ def prepare(
         everything else is copied once, to float32. Rows with NaN or infinity are dropped and
         counted. What is on the context's GPU as float32, float16 or bfloat16 stays there; only to
         infer viewpoints that are neither given nor declared unknown are points copied to the host.
+        Scans of 2-D scanners are recognised in host memory only.
         float64 coordinates too large for float32 (those of a map) lose nothing: their
         centre is taken off first and put back into results.
     normals : (N, 3) array, optional

@@ -333,10 +333,20 @@ def register(
         result = _core.align_within(context, a, b, time_budget_ms, options).result
     else:
         result = _core.align(context, a, b, options, None, prior)
-    question = _unit_question(clouds, not result.aligned)
-    if question:
+    questions = [_unit_question(clouds, not result.aligned)]
+    if not result.aligned:
+        questions += [_not_finite(a, "source"), _not_finite(b, "target")]
+    for question in filter(None, questions):
         warnings.warn(question, UserWarning, stacklevel=2)
     return result
+
+
+def _not_finite(cloud: PreparedCloud, name: str) -> str:
+    """Say how many points of a cloud are not finite, where nearly all are not."""
+    missing, points = cloud.statistics.invalid_points, cloud.statistics.input_points
+    if missing == 0 or 10 * missing < 9 * points:
+        return ""
+    return f"{missing} of the {points} points of the {name} are not finite"
 
 
 def _unit_question(clouds: list[Any], failed: bool) -> str:

@@ -120,6 +120,14 @@ def test_other_units_are_a_question(source):
     assert gpureg.register(source, source, 0.1, quality=1).aligned  # no warning
 
 
+def test_points_that_are_not_finite_are_counted_in_a_warning(source):
+    mostly = source.copy()
+    mostly[5:] = np.nan
+    text = f"{len(source) - 5} of the {len(source)} points of the target are not finite"
+    with pytest.warns(UserWarning, match=text):
+        assert not gpureg.register(source, mostly, 0.1, quality=0).aligned
+
+
 def test_own_features_and_correspondences(source, target, truth):
     # Features that know the answer: the coordinates at rest.
     options = few(2000)
