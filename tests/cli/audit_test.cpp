@@ -64,6 +64,16 @@ TEST_F(AuditCommand, AWrongScanIsNamed) {
   expect_holds(page, {"Contradicted", "Broken at scan 3", "<svg"});
 }
 
+TEST_F(AuditCommand, PosesThatAreInvertedAreNamed) {
+  std::ofstream file(out_ / "inverted.txt");
+  file.precision(17);
+  for (int k = 0; k < kScans; ++k) file << k << "\n" << scan_from_room(k).matrix() << "\n";
+  file.close();
+  const Outcome outcome = audit(out_ / "inverted.txt");
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  expect_holds(outcome.out, {"try        the poses look inverted", "expected map_from_scan"});
+}
+
 TEST_F(AuditCommand, PosesThatKeepAllScansApartAreNoSoundMap) {
   std::ofstream file(out_ / "apart.txt");
   for (int k = 0; k < kScans; ++k) file << k << " " << 1000 * k << " 0 0 0 0 0 1\n";

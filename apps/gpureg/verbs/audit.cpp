@@ -2,6 +2,7 @@
 #include "verbs/audit.hpp"
 
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -76,6 +77,23 @@ std::string summary(const AuditRun& run) {
   return out.str();
 }
 
+/// What to say of a file of poses that make a sound map inverted, where they make none as they are.
+std::string inverted(const Context& context, const AuditRun& run,
+                     const reconstruction::AuditOptions& options) {
+  std::error_code ignored;
+  if (run.audit.verdict() == AuditVerdict::sound ||
+      std::filesystem::is_directory(run.poses_file, ignored))
+    return "";
+  auto map = run.map;
+  for (reconstruction::Scan& scan : map.scans)
+    scan.island_from_scan = UnalignedIsometry3d(scan.island_from_scan.inverse());
+  const auto audit = reconstruction::audit(context, run.scene.clouds, map, run.options, options);
+  return audit.verdict() == AuditVerdict::sound
+             ? "try        the poses look inverted: their inverses make a sound map; expected "
+               "map_from_scan, which moves the points of a scan into the map\n"
+             : "";
+}
+
 /// Where the mended poses of each island go.
 std::vector<std::string> mended_files(const AuditVerbOptions& o, std::size_t islands) {
   std::vector<std::string> files;
@@ -116,7 +134,7 @@ int audit_and_mend(const AuditVerbOptions& o, const Context& context, AuditRun& 
   if (InterruptGuard::requested()) return kInterrupted;
   if (!o.json.empty()) write_document(o.json, audit_document(run, context));
   if (!o.page.empty()) files::write_atomically(o.page, audit_page(run));
-  if (!o.quiet) std::cout << summary(run) << std::flush;
+  if (!o.quiet) std::cout << summary(run) << inverted(context, run, options) << std::flush;
   return o.mended.empty() ? status_of(run.audit) : mend(o, context, run, options);
 }
 
