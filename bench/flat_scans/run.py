@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scans of 2-D scanners: recall, precision and calibration over all pairs of folders of scans.
 
-Generates buildings (`gpureg generate --scan-step`), and tests each by a fit of the confidence on the others; a
-pose is correct by Redwood's 0.2 m rule, and pairs that overlap by 30 % count. Then real scans, by the
-command's own confidence, where FOLDERs are given: cloud_bin_<i>.ply and poses.txt (carmen_scans.py makes them of a
-log of CARMEN). There a pair overlaps where 30 % of the points of a scan have a point of the other one within
+Generates buildings (`gpureg generate --scan-step`), and tests each by a fit of the confidence on the others, with
+the viewpoints of the scanner and without any; a pose is correct by Redwood's 0.2 m rule, and pairs that overlap by
+30 % count. Then real scans, by the command's own confidence, where FOLDERs are given: cloud_bin_<i>.ply and poses.txt
+(carmen_scans.py makes them of a log of CARMEN); without, those of the record stay, with their commit. There a pair overlaps where 30 % of the points of a scan have a point of the other one within
 0.15 m, and a pose is correct where it moves the source by at most 0.3 m RMS, as the true poses are estimates.
 
 usage: run.py [FOLDER...] [--seeds 1 2 3] [--work DIR] [--header FILE] [-o FILE]
@@ -153,10 +153,12 @@ def left_out(run, model, regressions):
 
 
 def generated_sets(arguments, work):
-    """Figures of every generated building by a fit on the others, all rows, the fits on all."""
+    """Figures of every generated building by a fit on the others, of every kind of building, and the fits on all.
+    A fit takes the runs of the first seed.
+    """
     import fit_confidence
 
-    every = {name: [] for name in fit_confidence.FLAT_MODELS}
+    every = {name: {} for name in fit_confidence.FLAT_MODELS}
     for name, (building, seed, step, field, distance, noise) in BUILDINGS.items():
         folder = work / name.replace(" ", "_")
         if not (folder / "gt.log").exists():
@@ -167,43 +169,64 @@ def generated_sets(arguments, work):
                 "--scan-range", distance, "--scan-noise", noise, "--quiet", *words,
             )  # fmt: skip
         for model in every:
-            result = folder / f"{model}.json"
-            if result.exists():
-                pass
-            elif model == "flat":
-                batch(arguments, folder, 1, result)
-            else:
-                with tempfile.TemporaryDirectory() as temporary:
-                    unknown = pathlib.Path(temporary) / "scans"
-                    shutil.copytree(folder, unknown, ignore=shutil.ignore_patterns("cameras.txt"))
-                    batch(arguments, unknown, 1, result, "--viewpoint", "none")
-            every[model].append(fit_confidence.Run(name, folder, result))
-    sets, all_rows = [], []
-    model = fit_confidence.FLAT_MODELS["flat"]
-    for run in every["flat"]:
-        others = [other for other in every["flat"] if other is not run]
-        rows = left_out(run, model, fit_confidence.fit(others, [], model))
-        sets.append({"set": run.building, "real": False, **figures(rows)})
-        print(json.dumps(sets[-1]), flush=True)
-        all_rows += rows
-    models = {
-        name: fit_confidence.fit(runs, [], fit_confidence.FLAT_MODELS[name])
-        for name, runs in every.items()
-    }
-    return sets, all_rows, models
+            for seed in arguments.seeds:
+                result = folder / f"{model}_{seed}.json"
+                if result.exists():
+                    pass
+                elif model == "flat":
+                    batch(arguments, folder, seed, result)
+                else:
+                    with tempfile.TemporaryDirectory() as temporary:
+                        unknown = pathlib.Path(temporary) / "scans"
+                        ignored = shutil.ignore_patterns("cameras.txt")
+                        shutil.copytree(folder, unknown, ignore=ignored)
+                        batch(arguments, unknown, seed, result, "--viewpoint", "none")
+                run = fit_confidence.Run(name, folder, result)
+                every[model].setdefault(name, []).append(run)
+    sets, kinds, models = [], [], {}
+    for name, buildings in every.items():
+        model = fit_confidence.FLAT_MODELS[name]
+        known = "given" if name == "flat" else "none"
+        of_kind = {}
+        for building, runs in buildings.items():
+            others = [of[0] for other, of in buildings.items() if other != building]
+            fitted = fit_confidence.fit(others, [], model)
+            rows = [row for run in runs for row in left_out(run, model, fitted)]
+            sets.append({"set": building, "viewpoints": known, "real": False, **figures(rows)})
+            print(json.dumps(sets[-1]), flush=True)
+            of_kind.setdefault(building.split()[0], []).append(rows)
+        for kind, each in of_kind.items():
+            text = f"{len(each)} {kind}s" if len(each) > 1 else kind
+            kinds.append(
+                {
+                    "set": text,
+                    "viewpoints": known,
+                    **figures([row for rows in each for row in rows]),
+                }
+            )
+        models[name] = fit_confidence.fit([of[0] for of in buildings.values()], [], model)
+    return sets, kinds, models
+
+
+def recorded(path):
+    """The real sets of a record, with the commit that made them."""
+    if not path.exists():
+        return []
+    record = json.loads(path.read_text())
+    return [{"commit": record["commit"], **of} for of in record["sets"] if of["real"]]
 
 
 def main():
     parser = record.parser(__doc__, "flat_scans.json")
     parser.add_argument("folders", nargs="*", type=pathlib.Path)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of real scans")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of the alignments")
     parser.add_argument("--scans", type=int, default=24, help="of each building")
     parser.add_argument("--voxel-size", default="0.1")
     parser.add_argument("--work", type=pathlib.Path, help="folder of the generated scans, kept")
     parser.add_argument("--header", type=pathlib.Path, help="confidence_model.hpp to write")
     arguments = parser.parse_args()
     work = arguments.work or pathlib.Path(tempfile.mkdtemp())
-    sets, rows, models = generated_sets(arguments, work)
+    sets, kinds, models = generated_sets(arguments, work)
     if arguments.header:
         import fit_confidence
 
@@ -212,9 +235,11 @@ def main():
         of = [row for seed in arguments.seeds for row in results(arguments, folder, seed)]
         sets.append({"set": folder.name, "real": True, **figures(of)})
         print(json.dumps(sets[-1]), flush=True)
+    if not arguments.folders:
+        sets += recorded(arguments.output)
     command = ["bench/flat_scans/run.py", *(folder.name for folder in arguments.folders)]
     command += ["--seeds", *map(str, arguments.seeds)]
-    content = {"seeds": arguments.seeds, "sets": sets, "generated": figures(rows)}
+    content = {"seeds": arguments.seeds, "sets": sets, "generated": kinds}
     record.write(arguments, " ".join(command), content)
 
 

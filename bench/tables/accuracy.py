@@ -521,21 +521,23 @@ def decisions_unseen():
 def flat_scans():
     record = load("flat_scans.json")
     rows = [
-        "| scans | pairs | overlapping | best candidate correct, % | reported: recall, % | precision, % | recall at precision >= 95 %, % | above 0.9 | of these correct, % |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| scans | viewpoints | pairs | overlapping | best candidate correct, % | reported: recall, % | precision, % | recall at precision >= 95 %, % | above 0.9 | of these correct, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    every = {"set": "all generated", **record["generated"]}
-    for of in [*record["sets"], every]:
+    commits = set()
+    for of in record["generated"] + [of for of in record["sets"] if of["real"]]:
+        commits.add(of.get("commit", record["commit"]))
         shares = [
             "-" if of[key] is None else percent(of[key])
             for key in ("best_candidate_correct", "recall", "precision", "recall_at_95")
         ]
         sure = of["correct_above_0.9"]
         rows.append(
-            f"| {of['set']} | {of['pairs']} | {of['overlapping']} | {' | '.join(shares)} | {of['above_0.9']} | "
+            f"| {of['set']} | {of.get('viewpoints', 'inferred')} | {of['pairs']} | {of['overlapping']} | {' | '.join(shares)} | {of['above_0.9']} | "
             f"{'-' if sure is None else percent(sure)} |"
         )
-    return [*rows, "", source(record) + "."]
+    earlier = ", ".join(sorted(commits - {record["commit"]}))
+    return [*rows, "", source(record) + (f"; real scans: {earlier}." if earlier else ".")]
 
 
 TABLES = {
