@@ -162,6 +162,8 @@ TEST_F(ReconstructCommand, ThePageIsSelfContained) {
   constexpr std::size_t kBytesPerPoint = 10;
   EXPECT_EQ(data.at("points").get<std::string>().size(), (kBytesPerPoint * points + 2) / 3 * 4);
   EXPECT_GT(points, 1000u);
+  EXPECT_EQ(data.at("figures").at("points_shown"), points);
+  EXPECT_GE(data.at("figures").at("points"), points);
   ASSERT_EQ(run(reconstruct("plain", {"--no-map"})).status, 0);
   EXPECT_FALSE(std::filesystem::exists(file("plain", "map.html")));
 }

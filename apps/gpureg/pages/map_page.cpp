@@ -74,6 +74,7 @@ class PagePoints {
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       const reconstruction::Scan& scan = run.map.scans[k];
       if (!scan.placed) continue;
+      of_map_ += surfaces[k].points.size();
       kept[k] = thinned(surfaces[k], share, spacing_[k]);
       const Eigen::Isometry3f pose(scan.island_from_scan.cast<float>());
       for (const std::size_t point : kept[k]) {
@@ -91,6 +92,8 @@ class PagePoints {
   }
 
   const std::string& bytes() const { return bytes_; }
+  std::size_t size() const { return count_; }
+  std::size_t of_map() const { return of_map_; }  ///< before they were thinned
   std::size_t first(std::size_t scan) const { return first_[scan]; }
   std::size_t count(std::size_t scan) const { return counts_[scan]; }
   float spacing(std::size_t scan) const { return spacing_[scan]; }
@@ -125,7 +128,7 @@ class PagePoints {
   std::vector<float> spacing_;
   std::vector<std::size_t> first_, counts_;
   std::vector<Eigen::Vector3f> positions_;
-  std::size_t count_ = 0;
+  std::size_t count_ = 0, of_map_ = 0;
   std::string bytes_;
 };
 
@@ -189,7 +192,8 @@ std::string sentence_of(const MapRun& run) {
   return text + ".";
 }
 
-Json figures_json(const MapRun& run, const std::vector<reconstruction::Link>& links) {
+Json figures_json(const MapRun& run, const std::vector<reconstruction::Link>& links,
+                  const PagePoints& points) {
   Json weakest = nullptr;
   for (const reconstruction::Link& link : links)
     if (weakest.is_null() || link.confidence < weakest.get<double>()) weakest = link.confidence;
@@ -205,6 +209,8 @@ Json figures_json(const MapRun& run, const std::vector<reconstruction::Link>& li
           {"accepted", run.accepted_edges()},
           {"rejected", run.map.edges.size() - run.accepted_edges()},
           {"weakest", weakest},
+          {"points_shown", points.size()},
+          {"points", points.of_map()},
           {"rms", run.refined ? Json(run.refined->final_rmse) : Json(nullptr)}};
 }
 
@@ -245,7 +251,7 @@ void write_map_page(const MapRun& run, const std::vector<Surface>& surfaces) {
     islands.push_back({{"scans", run.map.islands[k].scans.size()},
                        {"low", json_of(points.box(k).low)},
                        {"size", points.box(k).size()}});
-  const Json data = {{"figures", figures_json(run, links)},
+  const Json data = {{"figures", figures_json(run, links, points)},
                      {"scans", scans_json(run, points)},
                      {"edges", edges_json(run)},
                      {"links", links_json(links)},

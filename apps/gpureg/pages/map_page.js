@@ -322,6 +322,7 @@ function showFigures() {
   add(f.rejected, 'edges rejected');
   if (f.weakest !== null) add(probability(f.weakest), 'confidence of the weakest connection', grade(f.weakest));
   if (f.rms !== null) add(`${fixed(1000 * f.rms, 1)} mm`, 'RMS distance of surfaces');
+  if (f.points_shown < f.points) add(f.points_shown.toLocaleString('en'), `of ${f.points.toLocaleString('en')} points shown, evenly thinned`);
 }
 function list(title, entries, none, folded) {
   const aside = element('lists'), h = document.createElement('h2');
