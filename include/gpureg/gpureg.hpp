@@ -6,6 +6,7 @@
 /// loop_closure.hpp, mesh.hpp, overlay.hpp, pcl.hpp, pose_graph.hpp, reconstruction.hpp.
 #include "gpureg/calibration.hpp"
 #include "gpureg/loop_consistency.hpp"
+#include "gpureg/preparation/sensor_fixed.hpp"
 #include "gpureg/pruning.hpp"
 #include "gpureg/registration.hpp"
 #include "gpureg/surface_set.hpp"

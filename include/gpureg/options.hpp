@@ -41,6 +41,11 @@ struct PrepareOptions {
   /// the evidence; 0: not at all (paper: 0). Takes half a byte for each cell of a tenth of it in
   /// the cloud's box; a box of more than 2^26 cells gets none.
   float surface_side_distance = 0.5f;
+  /// Keep points at the smallest and the largest range of the sensor: a tank scanned from its
+  /// centre has its wall there. Otherwise they are left out, because they are fixed to the sensor
+  /// and support no other pose than that at which it did not move
+  /// (gpureg/preparation/sensor_fixed.hpp).
+  bool keep_range_limits = false;
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

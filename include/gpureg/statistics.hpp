@@ -124,6 +124,11 @@ struct PrepareStatistics {
   /// Dropped because they have fewer than two points within the normal radius; only in clouds
   /// with so many of them that they would exhaust the memory.
   std::uint64_t stray_points = 0;
+  /// Left out because they lie at the smallest or the largest range of the sensor, not on a surface
+  /// (gpureg/preparation/sensor_fixed.hpp, PrepareOptions::keep_range_limits).
+  std::uint64_t range_limit_points = 0;
+  double smallest_range = 0;                ///< of those of them near the sensor; 0: none, or there
+  double largest_range = 0;                 ///< of those of them far from it; 0: none
   std::uint32_t points = 0;                 ///< after downsampling
   std::uint32_t points_without_normal = 0;  ///< fewer than 3 neighbours
   /// No neighbour within the feature radius, or no normal: never matched.

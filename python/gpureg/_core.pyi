@@ -60,6 +60,7 @@ class PrepareOptions:
     max_correspondence_distance: float
     depth_maps: int
     surface_side_distance: float
+    keep_range_limits: bool
     def __init__(
         self,
         *,
@@ -70,6 +71,7 @@ class PrepareOptions:
         max_correspondence_distance: float = ...,
         depth_maps: int = ...,
         surface_side_distance: float = ...,
+        keep_range_limits: bool = ...,
     ) -> None: ...
     def replace(
         self,
@@ -81,6 +83,7 @@ class PrepareOptions:
         max_correspondence_distance: float = ...,
         depth_maps: int = ...,
         surface_side_distance: float = ...,
+        keep_range_limits: bool = ...,
     ) -> PrepareOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -368,6 +371,12 @@ class PrepareStatistics:
     def invalid_points(self) -> int: ...
     @property
     def stray_points(self) -> int: ...
+    @property
+    def range_limit_points(self) -> int: ...
+    @property
+    def smallest_range(self) -> float: ...
+    @property
+    def largest_range(self) -> float: ...
     @property
     def points(self) -> int: ...
     @property

@@ -2,9 +2,12 @@
 #include "gpureg/point_cloud.hpp"
 
 #include "algorithm/normal.hpp"
+#include "api/raw_cloud.hpp"
 #include "common/coordinates.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
+#include "sensor_fixed/known.hpp"
+#include "sensor_fixed/range_shells.hpp"
 
 namespace gpureg {
 
@@ -65,6 +68,13 @@ PointCloudView PointCloud::view() const {
   v.model = model && v.normals && v.viewpoint_count == 0;
   for (int k = 0; k < 3; ++k) v.origin[k] = origin[k];
   return v;
+}
+
+RangeLimits range_limits(const PointCloudView& cloud) {
+  RawCloud raw = raw_cloud(cloud);
+  FrameOrigin origin;
+  view_from_frame_origin(cloud.origin, origin, raw);
+  return has_sensor_frame(cloud) ? range_shells(raw).limits : RangeLimits{};
 }
 
 }  // namespace gpureg

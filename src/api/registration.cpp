@@ -18,6 +18,8 @@
 #include "common/limits.hpp"
 #include "common/validate.hpp"
 #include "flat/extruded.hpp"
+#include "sensor_fixed/known.hpp"
+#include "sensor_fixed/range_shells.hpp"
 #include "spacing/stray_points.hpp"
 #include "viewpoint/unknown_viewpoint.hpp"
 
@@ -43,15 +45,19 @@ constexpr std::size_t kRawPointsPerThread = 200'000;
 
 /// The owners of the rows that the engine gets of a cloud.
 struct OwnedRows {
+  WithoutRangeShells seen;
   Extruded extruded;
   WithoutStrayPoints kept;
-  OwnedRows(const RawCloud& raw, bool model, const PrepareOptions& options)
-      : extruded(raw, model, options), kept(extruded.cloud(), options) {}
+  OwnedRows(const RawCloud& raw, const CloudKnowledge& known, const PrepareOptions& options)
+      : seen(raw, options.keep_range_limits || !has_sensor_frame(known)),
+        extruded(seen.cloud(), known.model, options),
+        kept(extruded.cloud(), options) {}
   OwnedRows(const OwnedRows&) = delete;
   OwnedRows& operator=(const OwnedRows&) = delete;
 };
 
-/// Replaces clouds by those that the engine gets: 2-D scans in layers, without stray points.
+/// Replaces clouds by those that the engine gets: without points at the limits of the range, 2-D
+/// scans in layers, without stray points.
 /// @return the owners of the rows.
 template <typename Naming>
 std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
@@ -67,7 +73,7 @@ std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
   on_threads(workers, [&](std::size_t worker) {
     for (std::size_t k = worker; k < raw.size(); k += workers)
       naming(k, [&] {
-        const OwnedRows& rows = owners[k].emplace(raw[k], knowledge[k].model, options);
+        const OwnedRows& rows = owners[k].emplace(raw[k], knowledge[k], options);
         raw[k] = rows.kept.cloud();
         knowledge[k].flat = rows.extruded.plane().exists();
         // The origin of the frame may be below the scanner.
@@ -124,6 +130,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
         state->plane = rows.extruded.plane();
         rows.kept.count(state->statistics);
         rows.extruded.count(state->statistics);
+        rows.seen.count(state->statistics);
         states.push_back(std::move(state));
       }
     });

@@ -47,6 +47,7 @@ struct Fields<PrepareOptions> {
     v(&O::max_correspondence_distance, {"max_correspondence_distance", kLength, voxels(1.5f), "Largest distance of an inlier and of a correspondence of the refinement. An alignment may use a smaller one than its clouds were prepared with, never a larger one."});
     v(&O::depth_maps, {"depth_maps", from(0, limits::kMaxDepthMaps), "Viewpoints that get a depth map for free-space tests; 0: none, and given normals are never flipped."});
     v(&O::surface_side_distance, {"surface_side_distance", kLengthOrZero, voxels(10), "Range in front of and behind its surfaces within which a cloud tells the two sides apart; 0: no such evidence."});
+    v(&O::keep_range_limits, {"keep_range_limits", "Keep points at the smallest and the largest range of the sensor, which are fixed to it: for a tank scanned from its centre."});
   }
   // clang-format on
 };

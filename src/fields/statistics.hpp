@@ -68,6 +68,9 @@ struct Fields<PrepareStatistics> {
     v(&P::input_points, {"input_points", "Points that came in."});
     v(&P::invalid_points, {"invalid_points", "Of these, dropped for NaN or infinity."});
     v(&P::stray_points, {"stray_points", "Dropped because they have fewer than two points within the normal radius; only in clouds with so many of them that they would exhaust the memory."});
+    v(&P::range_limit_points, {"range_limit_points", "Left out because they lie at the smallest or the largest range of the sensor, not on a surface."});
+    v(&P::smallest_range, {"smallest_range", "Of those of them near the sensor; 0: none, or at the sensor itself."});
+    v(&P::largest_range, {"largest_range", "Of those of them far from the sensor; 0: none."});
     v(&P::points, {"points", "After downsampling."});
     v(&P::points_without_normal, {"points_without_normal", "Fewer than 3 neighbours."});
     v(&P::points_without_feature, {"points_without_feature", "Never matched."});

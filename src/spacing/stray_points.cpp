@@ -235,15 +235,6 @@ std::vector<std::uint32_t> rows_with_neighbors(const RawCloud& raw, const Box& b
   return rows;
 }
 
-std::vector<float> chosen(const float* values, std::size_t width, std::size_t stride,
-                          const std::vector<std::uint32_t>& rows) {
-  std::vector<float> out;
-  out.reserve(width * rows.size());
-  for (const std::uint32_t row : rows)
-    out.insert(out.end(), values + row * stride, values + row * stride + width);
-  return out;
-}
-
 std::string extent_of(const Box& box) {
   return shown(box.size(0), 6) + " x " + shown(box.size(1), 6) + " x " + shown(box.size(2), 6);
 }
@@ -271,7 +262,7 @@ std::string extent_of(const Box& box) {
 }  // namespace
 
 WithoutStrayPoints::WithoutStrayPoints(const RawCloud& raw, const PrepareOptions& options)
-    : cloud_(raw), input_points_(raw.size) {
+    : kept_(raw), input_points_(raw.size) {
   const std::uint64_t most = std::max<std::uint64_t>(
       limits::kMaxClosestBlocks,
       static_cast<std::uint64_t>(limits::kBlocksPerPoint * static_cast<double>(raw.size)));
@@ -298,24 +289,8 @@ WithoutStrayPoints::WithoutStrayPoints(const RawCloud& raw, const PrepareOptions
   invalid_points_ = raw.size - box.finite;
   stray_points_ = box.finite - rows_.size();
   if (rows_.size() * kLeastShare < box.finite) throw_isolated(box, options);
-  keep(raw);
-  if (exceeds(cloud_, blocks, reach, most)) throw_too_wide(box, stray_points_, options);
-}
-
-void WithoutStrayPoints::keep(const RawCloud& raw) {
-  points_ = chosen(raw.points, 3, raw.point_stride, rows_);
-  cloud_.points = points_.data();
-  cloud_.size = rows_.size();
-  cloud_.point_stride = 3;
-  if (raw.normals) {
-    normals_ = chosen(raw.normals, 3, raw.normal_stride, rows_);
-    cloud_.normals = normals_.data();
-    cloud_.normal_stride = 3;
-  }
-  if (!raw.features) return;
-  features_ = chosen(raw.features, raw.feature_dimension, raw.feature_stride, rows_);
-  cloud_.features = features_.data();
-  cloud_.feature_stride = raw.feature_dimension;
+  kept_.keep(raw, rows_);
+  if (exceeds(cloud(), blocks, reach, most)) throw_too_wide(box, stray_points_, options);
 }
 
 void WithoutStrayPoints::count(PrepareStatistics& statistics) const {

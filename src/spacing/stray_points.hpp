@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "pipeline/types.hpp"
+#include "pipeline/kept_rows.hpp"
 
 namespace gpureg {
 
@@ -20,19 +20,16 @@ class WithoutStrayPoints {
   WithoutStrayPoints(const RawCloud& raw, const PrepareOptions& options);
 
   /// Valid as long as this object and the rows given to it.
-  const RawCloud& cloud() const { return cloud_; }
+  const RawCloud& cloud() const { return kept_.cloud(); }
   /// Rows that are left, where some were dropped; else empty.
   const std::vector<std::uint32_t>& rows() const { return rows_; }
   /// Corrects the counts of the cloud's preparation.
   void count(PrepareStatistics& statistics) const;
 
  private:
-  void keep(const RawCloud& raw);
-
-  RawCloud cloud_;
+  KeptRows kept_;
   std::uint64_t input_points_, invalid_points_ = 0, stray_points_ = 0;
   std::vector<std::uint32_t> rows_;
-  std::vector<float> points_, normals_, features_;
 };
 
 }  // namespace gpureg

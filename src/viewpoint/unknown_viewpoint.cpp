@@ -140,6 +140,9 @@ struct Inheritance {
     s.input_points = statistics.input_points;
     s.invalid_points = statistics.invalid_points;
     s.stray_points = statistics.stray_points;
+    s.range_limit_points = statistics.range_limit_points;
+    s.smallest_range = statistics.smallest_range;
+    s.largest_range = statistics.largest_range;
     s.viewpoint = statistics.viewpoint;
     s.repaired_normals = statistics.repaired_normals;
     s.flat = statistics.flat;

@@ -138,7 +138,7 @@ def full_folders(root: pathlib.Path) -> list[str]:
 # Folders whose sources are one library, without those that are compiled alone, for their flags.
 TOGETHER = (
     ("src/cpu",),
-    tuple(f"src/{name}" for name in ("api viewpoint flat symmetry spacing confidence calibration"
+    tuple(f"src/{name}" for name in ("api viewpoint flat symmetry spacing sensor_fixed confidence calibration"
                                      " loop_consistency pruning").split()),
     *((f"src/{name}",) for name in "evaluation io pose_graph reconstruction localization fields files".split()),
     ("data",),
