@@ -8,6 +8,7 @@
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
 #include "flat/planar_pose.hpp"
+#include "sensor_fixed/common_view.hpp"
 
 namespace gpureg {
 
@@ -25,6 +26,11 @@ struct AlignedPair {
   UnalignedIsometry3d transform_of(const Pose<double>& pose) const {
     const UnalignedIsometry3d found = to_transform(pose, source, target, swapped);
     return flat() ? planar(found, source.plane, target.plane, origin_of(source)) : found;
+  }
+  bool contradicts_common_view(const ModeOutcome& mode) const {
+    return gpureg::contradicts_common_view(
+        mode, swapped ? target : source, swapped ? source : target,
+        static_cast<double>(options.prepare.max_correspondence_distance));
   }
   /// Of all modes, in their order.
   std::vector<PoseEvidence> evidence_of(const PairOutcome& outcome) const {

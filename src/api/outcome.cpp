@@ -189,8 +189,12 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
                                  const PriorTest& prior) {
   // Refinement moves poses, so they are asked again. Nothing speaks against a 2-D scan that it
   // moved to where nothing overlaps.
+  bool contradicts_prior = false;
   const auto forbidden = [&](const ModeOutcome& m) {
-    return !permitted(prior, to_rigid(m.pose)) || (pair.flat() && confidence::without_overlap(m));
+    const bool refused =
+        !permitted(prior, to_rigid(m.pose)) || (pair.flat() && confidence::without_overlap(m));
+    contradicts_prior |= refused;
+    return refused || pair.contradicts_common_view(m);
   };
   const bool some_contradict = std::any_of(all.modes.begin(), all.modes.end(), forbidden);
   PairOutcome kept;
@@ -230,7 +234,7 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
     result.reason =
         pair.flat() && outcome.modes.empty() && outcome.statistics.scored > 0
             ? RegistrationReason::confidence_too_low
-            : evidence_reason(result, some_contradict && outcome.modes.empty(), pair.options);
+            : evidence_reason(result, outcome.modes.empty() && contradicts_prior, pair.options);
     result.status = status_of(result, pair.options);
     if (result.reason != RegistrationReason::none && result.statistics.inliers == 0)
       drop_candidate(result);

@@ -104,6 +104,7 @@ void set_confidences(const VerifiedPair& pair, const PairOutcome& outcome, const
   const std::vector<VerifiedPair::Candidate> alternatives =
       found != nullptr ? pair.alternatives_of(*found) : given;
   for (std::size_t k = 0; k < poses.size(); ++k) {
+    if (pair.contradicts_common_view(outcome.modes[k])) continue;  // the confidence stays 0
     const confidence::ModeConfidence confidence =
         pair.confidence_of(given[k], alternatives, poses[k].source_moments);
     poses[k].confidence = confidence.confidence;
