@@ -109,6 +109,7 @@ std::string MapState::name_of(std::size_t tile) {
 
 PrepareOptions as_they_are(PrepareOptions options) {
   options.voxel_size = 0;
+  options.keep_range_limits = true;  // the scans have left theirs out
   return options;
 }
 

@@ -269,7 +269,7 @@ RangeShells range_shells(const RawCloud& raw) {
            shell.surrounds_sensor(planar);
   };
   out.to = std::numeric_limits<double>::infinity();
-  if (extent.at_sensor >= least) {
+  if (extent.at_sensor >= least && extent.finite - extent.at_sensor >= kLeastPoints) {
     out.limits.smallest_points = extent.at_sensor;
     out.from = std::sqrt(static_cast<double>(sample.at_sensor()));
   }

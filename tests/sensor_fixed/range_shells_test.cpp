@@ -134,6 +134,13 @@ TEST_F(RangeShells, AreNotSeenInSurfaces) {
   }
 }
 
+TEST_F(RangeShells, AreNotAllOfACloud) {
+  EXPECT_EQ(limits_of(Points(1000, Eigen::Vector3f::Zero())).points(), 0u);
+  EXPECT_EQ(limits_of(Points(1000, Eigen::Vector3f(1, 2, 3))).points(), 0u);
+  EXPECT_EQ(limits_of(Points(1000, Eigen::Vector3f::Constant(std::nanf("")))).points(), 0u);
+  EXPECT_EQ(limits_of({}).points(), 0u);
+}
+
 TEST_F(RangeShells, OfModelsAndCloudsWithoutViewpointStay) {
   const Points points = with_shell(room_, 0.05f, 30, 0, 0.7f, random_);
   PointCloudView view(points);
