@@ -14,6 +14,7 @@
 #include "inputs/cloud_file.hpp"
 #include "run/interrupt.hpp"
 #include "run/progress.hpp"
+#include "run/sensor_fixed_note.hpp"
 #include "run/spacing.hpp"
 #include "run/viewpoint_note.hpp"
 
@@ -77,16 +78,13 @@ struct Prepared {
 };
 
 // Of clouds that are read, those that can be prepared: together, and one by one where one cannot.
-std::vector<Prepared> prepare_usable(const Context& context, const FragmentFolder& folder,
+std::vector<Prepared> prepare_usable(const Context& context, const std::vector<std::string>& names,
                                      const std::vector<PointCloud>& clouds,
-                                     const std::vector<std::size_t>& places,
                                      const PrepareOptions& options, bool infer_viewpoint) {
   std::vector<PointCloudView> views;
-  std::vector<std::string> names;
   for (std::size_t k = 0; k < clouds.size(); ++k) {
     views.push_back(clouds[k].view());
     views.back().infer_viewpoint = infer_viewpoint || !clouds[k].viewpoints.empty();
-    names.push_back(folder.scans[places[k]].path);
   }
   std::vector<Prepared> out;
   try {
@@ -183,6 +181,7 @@ PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
   const std::size_t size = folder.numbers.size();
   std::map<std::size_t, std::string> bad;
   ViewpointNote viewpoints;
+  SensorFixedNote sensor_fixed;
   Progress progress("preparing", "fragments", size, quiet);
   for (std::size_t next = 0; next < size;) {
     if (InterruptGuard::requested()) {
@@ -191,6 +190,7 @@ PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
     }
     std::vector<PointCloud> chunk;
     std::vector<std::size_t> places;
+    std::vector<std::string> files;
     for (std::size_t points = 0;
          next < size && chunk.size() < kChunkClouds && points < kChunkPoints; ++next) {
       try {
@@ -201,16 +201,19 @@ PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
         continue;
       }
       places.push_back(next);
+      files.push_back(folder.scans[next].path);
       if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), folder.scans[next].path);
       points += chunk.back().points.size();
     }
-    const auto prepared = prepare_usable(context, folder, chunk, places, options, infer_viewpoint);
+    sensor_fixed.leave_out_parts(chunk, files, infer_viewpoint);
+    const auto prepared = prepare_usable(context, files, chunk, options, infer_viewpoint);
     for (std::size_t k = 0; k < chunk.size(); ++k) {
       if (!prepared[k].reason.empty()) {
         bad[places[k]] = prepared[k].reason;
         continue;
       }
       folder.clouds.push_back(*prepared[k].cloud);
+      sensor_fixed.see(folder.clouds.back().statistics(), files[k]);
       folder.hashes.push_back(hash_of(chunk[k]));
       folder.extent = std::max(folder.extent, extent_of(chunk[k].points));
     }
@@ -218,6 +221,7 @@ PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
   }
   folder.seconds = progress.seconds();
   viewpoints.print();
+  if (!quiet) sensor_fixed.print();
   if (!folder.interrupted) folder.leave_out(bad);
   return folder;
 }

@@ -11,6 +11,7 @@
 #include "gpureg/voxel_size.hpp"
 #include "inputs/cloud_file.hpp"
 #include "options/output_path.hpp"
+#include "run/sensor_fixed_note.hpp"
 #include "run/spacing.hpp"
 #include "text.hpp"
 
@@ -58,6 +59,10 @@ void print_cloud(const std::string& path) {
                                          " (median distance to the nearest neighbour)"
                                    : std::string("none, ") + explain(suggestion.reason))
             << "\n";
+  if (const RangeLimits limits = range_limits(cloud.view()); limits.points() > 0)
+    std::cout << "  without return   "
+              << at_range_limits(limits.points(), limits.smallest_range, limits.largest_range)
+              << " (left out)\n";
   if (!suggestion.valid()) return;
   if (suggestion.flat)
     std::cout << "  flat             a scan of a 2-D scanner: poses stay in its plane\n";
@@ -70,6 +75,24 @@ void print_cloud(const std::string& path) {
             << (suggestion.flat ? " points in layers)\n" : " points)\n");
 }
 
+/// Of several scans.
+void print_fixed_parts(const std::vector<std::string>& paths) {
+  std::vector<PointCloud> clouds;
+  std::vector<PointCloudView> views;
+  for (const std::string& path : paths) {
+    const io::ScanPath scan = io::scan_path(path);
+    if (scan.part == 0 && io::scans_in(scan.file).size() > 1) return;
+    clouds.push_back(read_cloud(path, 0, MeshNote::none));
+  }
+  for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
+  const FixedParts parts = find_fixed_parts(views);
+  for (std::size_t k = 0; k < views.size(); ++k)
+    if (const std::size_t rows = rows_in(parts, views[k]).size(); rows > 0)
+      std::cout << paths[k] << "\n  fixed to sensor  " << grouped(rows) << " points ("
+                << percent(static_cast<double>(rows) / static_cast<double>(views[k].size))
+                << " %) at the same place in most of these scans (left out of sets)\n";
+}
+
 int run(const std::vector<std::string>& clouds) {
   if (clouds.empty()) {
     std::cout << "gpureg " GPUREG_VERSION "\n";
@@ -79,6 +102,7 @@ int run(const std::vector<std::string>& clouds) {
   for (const std::string& path : clouds) inputs.push_back({"CLOUD", path});
   check_outputs({}, inputs);
   for (const std::string& path : clouds) print_cloud(path);
+  if (clouds.size() > 1) print_fixed_parts(clouds);
   return kOk;
 }
 

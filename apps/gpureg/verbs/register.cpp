@@ -30,6 +30,7 @@
 #include "pictures/image.hpp"
 #include "records/pose_text.hpp"
 #include "records/result_json.hpp"
+#include "run/sensor_fixed_note.hpp"
 #include "run/spacing.hpp"
 #include "run/viewpoint_note.hpp"
 #include "text.hpp"
@@ -54,6 +55,9 @@ std::string describe(const PrepareStatistics& s) {
   std::string text = grouped(s.input_points) + " points";
   if (s.invalid_points > 0) text += " (" + grouped(s.invalid_points) + " not finite, dropped)";
   if (s.stray_points > 0) text += " (" + grouped(s.stray_points) + " stray, dropped)";
+  if (s.range_limit_points > 0)
+    text += " (" + at_range_limits(s.range_limit_points, s.smallest_range, s.largest_range) +
+            ", left out)";
   text += ", " + grouped(s.points) + " prepared";
   if (s.flat) text += " in layers (flat: a scan of a 2-D scanner)";
   if (s.points_without_feature > 0)
