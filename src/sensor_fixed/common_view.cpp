@@ -27,11 +27,12 @@ bool contradicts_common_view(const ModeOutcome& mode, const PreparedState& moved
   if (!has_sensor(moved) || !has_sensor(fixed)) return false;
   const Vec3 from = apply(to_rigid(mode.pose), moved.viewpoints.front());
   if (!(static_cast<double>(norm(from - fixed.viewpoints.front())) <= distance)) return false;
-  const SideEvidence &a = mode.source, &b = mode.target;
-  const double tested = static_cast<double>(a.tested) + b.tested,
-               observed = static_cast<double>(a.observed) + b.observed,
-               different = static_cast<double>(a.violating) + a.occluded + b.violating + b.occluded;
-  return observed >= kLeastObserved * tested && different > kMostDifferent * observed;
+  const auto both = [&](Term term) {
+    return static_cast<double>(mode.source[term] + mode.target[term]);
+  };
+  const double observed = both(Term::observed),
+               different = both(Term::violating) + both(Term::occluded);
+  return observed >= kLeastObserved * both(Term::tested) && different > kMostDifferent * observed;
 }
 
 }  // namespace gpureg

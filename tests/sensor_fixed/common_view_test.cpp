@@ -20,10 +20,10 @@ struct Scan : PreparedState {
 ModeOutcome mode_with(std::uint32_t observed, std::uint32_t violating, std::uint32_t occluded) {
   ModeOutcome mode;
   for (SideEvidence* side : {&mode.source, &mode.target}) {
-    side->tested = 1000;
-    side->observed = observed;
-    side->violating = violating;
-    side->occluded = occluded;
+    (*side)[Term::tested] = 1000;
+    (*side)[Term::observed] = observed;
+    (*side)[Term::violating] = violating;
+    (*side)[Term::occluded] = occluded;
   }
   return mode;
 }
