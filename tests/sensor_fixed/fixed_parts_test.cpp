@@ -5,13 +5,21 @@
 
 #include "gpureg/io.hpp"
 #include "gpureg/preparation/sensor_fixed.hpp"
+#include "sensor_fixed/parts.hpp"
 #include "sensor_fixed/scans.hpp"
 #include "support/data_folder.hpp"
 
 namespace gpureg {
 namespace {
 
+using test::add;
+using test::of_disc;
+using test::of_frame;
+using test::of_hand;
+using test::of_vehicle;
+using test::Part;
 using test::Points;
+using test::views_of;
 
 /// A scan of a furnished room of 9 x 7 x 2.6 m from a place and a heading, in the frame of the
 /// sensor.
@@ -43,42 +51,6 @@ std::vector<Points> walk(int scans, std::mt19937& random) {
   for (int k = 0; k < scans; ++k)
     out.push_back(
         scan_from({1 + 7 * unit(random), 3 + unit(random), 1.2f}, 6.28f * unit(random), random));
-  return out;
-}
-
-using Part = std::function<Eigen::Vector3f(std::mt19937&)>;
-
-/// Shows so large a share of a part in every scan.
-void add(const Part& part, double share, std::vector<Points>& scans, std::mt19937& random) {
-  for (Points& scan : scans) {
-    const auto rows =
-        static_cast<std::size_t>(share / (1 - share) * static_cast<double>(scan.size()));
-    for (std::size_t k = 0; k < rows; ++k) scan.push_back(part(random));
-  }
-}
-
-float between(float low, float high, std::mt19937& random) {
-  return std::uniform_real_distribution<float>(low, high)(random);
-}
-Eigen::Vector3f of_vehicle(std::mt19937& random) {
-  return {between(-0.5f, 0.3f, random), between(-0.25f, 0.25f, random),
-          between(-0.31f, -0.3f, random)};
-}
-Eigen::Vector3f of_hand(std::mt19937& random) {
-  return Eigen::Vector3f(0.5f, 0.1f, -0.2f) + 0.08f * test::any_direction(random);
-}
-Eigen::Vector3f of_disc(std::mt19937& random) {
-  const float turn = between(0, 6.2832f, random), radius = 0.4f * std::sqrt(between(0, 1, random));
-  return {radius * std::cos(turn), radius * std::sin(turn), between(-0.41f, -0.4f, random)};
-}
-Eigen::Vector3f of_frame(std::mt19937& random) {
-  const float side = between(-0.25f, 0.25f, random);
-  return random() % 2 == 0 ? Eigen::Vector3f(0.4f, side, 0.2f) : Eigen::Vector3f(0.4f, 0.25f, side);
-}
-
-std::vector<PointCloudView> views_of(const std::vector<Points>& scans) {
-  std::vector<PointCloudView> out;
-  for (const Points& scan : scans) out.emplace_back(scan);
   return out;
 }
 
