@@ -19,8 +19,8 @@ namespace gpureg {
 using CudaStream = CUstream_st*;  ///< cudaStream_t; null is the default stream
 
 /// Non-owning view of a point cloud in device memory: float32 rows, strides in floats. The fields
-/// have the meaning of those of PointCloudView. Stray points are not dropped from it
-/// (PrepareStatistics::stray_points).
+/// have the meaning of those of PointCloudView. Stray points and those at the limits of the
+/// sensor's range are not dropped from it (PrepareStatistics).
 struct DevicePointCloudView {
   const float* points = nullptr;  ///< device: size rows of x, y, z; metres
   std::size_t size = 0;

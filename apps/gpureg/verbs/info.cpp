@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "command.hpp"
@@ -38,15 +39,19 @@ void print_scans(const std::string& path, const std::vector<io::StoredScan>& sca
   }
 }
 
-void print_cloud(const std::string& path) {
+/// Returns the cloud; of a file that holds several scans, none.
+PointCloud print_cloud(const std::string& path) {
   const std::vector<io::StoredScan> scans = io::scans_in(io::scan_path(path).file);
-  if (scans.size() > 1 && io::scan_path(path).part == 0) return print_scans(path, scans);
-  const PointCloud cloud = read_cloud(path, 0, MeshNote::print);
+  if (scans.size() > 1 && io::scan_path(path).part == 0) {
+    print_scans(path, scans);
+    return {};
+  }
+  PointCloud cloud = read_cloud(path, 0, MeshNote::print);
   const std::vector<Eigen::Vector3f> points = finite_points(cloud.points);
   std::cout << path << "\n  points           " << grouped(cloud.points.size())
             << (cloud.normals.empty() ? ", without normals" : ", with normals") << "\n"
             << "  not finite       " << grouped(cloud.points.size() - points.size()) << "\n";
-  if (points.empty()) return;
+  if (points.empty()) return cloud;
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& p : points) box.extend(p);
   const Eigen::Vector3d low = box.min().cast<double>() + cloud.origin,
@@ -63,7 +68,7 @@ void print_cloud(const std::string& path) {
     std::cout << "  without return   "
               << at_range_limits(limits.points(), limits.smallest_range, limits.largest_range)
               << " (left out)\n";
-  if (!suggestion.valid()) return;
+  if (!suggestion.valid()) return cloud;
   if (suggestion.flat)
     std::cout << "  flat             a scan of a 2-D scanner: poses stay in its plane\n";
   std::cout << "  noise            " << significant(suggestion.noise, 2)
@@ -73,18 +78,15 @@ void print_cloud(const std::string& path) {
             << significant(static_cast<double>(suggestion.voxel_size), 3) << " (leaves about "
             << grouped(suggestion.points)
             << (suggestion.flat ? " points in layers)\n" : " points)\n");
+  return cloud;
 }
 
-/// Of several scans.
-void print_fixed_parts(const std::vector<std::string>& paths) {
-  std::vector<PointCloud> clouds;
-  std::vector<PointCloudView> views;
-  for (const std::string& path : paths) {
-    const io::ScanPath scan = io::scan_path(path);
-    if (scan.part == 0 && io::scans_in(scan.file).size() > 1) return;
-    clouds.push_back(read_cloud(path, 0, MeshNote::none));
-  }
-  for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
+/// Scans that are compared, so that a long list does not fill the memory.
+constexpr std::size_t kComparedScans = 32;
+
+void print_fixed_parts(const std::vector<std::string>& paths,
+                       const std::vector<PointCloud>& clouds) {
+  const std::vector<PointCloudView> views = views_of(clouds);
   const FixedParts parts = find_fixed_parts(views);
   for (std::size_t k = 0; k < views.size(); ++k)
     if (const std::size_t rows = rows_in(parts, views[k]).size(); rows > 0)
@@ -101,8 +103,12 @@ int run(const std::vector<std::string>& clouds) {
   std::vector<NamedPath> inputs;
   for (const std::string& path : clouds) inputs.push_back({"CLOUD", path});
   check_outputs({}, inputs);
-  for (const std::string& path : clouds) print_cloud(path);
-  if (clouds.size() > 1) print_fixed_parts(clouds);
+  std::vector<PointCloud> compared;
+  for (const std::string& path : clouds) {
+    PointCloud cloud = print_cloud(path);
+    if (compared.size() < kComparedScans) compared.push_back(std::move(cloud));
+  }
+  print_fixed_parts(clouds, compared);
   return kOk;
 }
 
