@@ -45,7 +45,10 @@ void SensorFixedNote::Most::see(std::uint64_t points, std::uint64_t of, const st
 
 std::string SensorFixedNote::Most::line() const {
   return text + " (" + percent(share) + " % of " + file +
-         (clouds > 1 ? ", and some of " + std::to_string(clouds - 1) + " more scans" : "") + ")";
+         (clouds > 2   ? ", and some of " + std::to_string(clouds - 1) + " more scans"
+          : clouds > 1 ? ", and some of another scan"
+                       : "") +
+         ")";
 }
 
 void SensorFixedNote::leave_out_parts(std::vector<PointCloud>& clouds,
