@@ -34,6 +34,7 @@ struct LoopConsistencyOptions {
   /// with the number of pairs times this.
   std::uint32_t neighbors = 64;
   std::uint32_t iterations = 3;  ///< damped updates, 1..100
+  int threads = 0;               ///< 0: one per core. Results do not depend on it.
 
   /// closing_distance of three voxels; the rest does not depend on the voxel.
   /// @throws InvalidArgument unless voxel_size is finite and > 0.

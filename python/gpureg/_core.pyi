@@ -572,6 +572,7 @@ class LoopConsistencyOptions:
     modes: int
     neighbors: int
     iterations: int
+    threads: int
     def __init__(
         self,
         *,
@@ -585,6 +586,7 @@ class LoopConsistencyOptions:
         modes: int = ...,
         neighbors: int = ...,
         iterations: int = ...,
+        threads: int = ...,
     ) -> None: ...
     def replace(
         self,
@@ -599,6 +601,7 @@ class LoopConsistencyOptions:
         modes: int = ...,
         neighbors: int = ...,
         iterations: int = ...,
+        threads: int = ...,
     ) -> LoopConsistencyOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...

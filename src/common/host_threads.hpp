@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <exception>
 #include <thread>
 #include <vector>
 
 namespace gpureg {
+
+/// The number of threads that an option asks for; 0: one per core.
+inline int thread_count(int option) {
+  if (option > 0) return option;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
 
 /// As many of `count` threads as the system starts; start(k) makes thread k. A limit on processes
 /// or on memory leaves fewer.

@@ -26,6 +26,7 @@ struct Fields<LoopConsistencyOptions> {
     v(&O::modes, {"modes", from(1, 16), "Number of modes of a pair that take part."});
     v(&O::neighbors, {"neighbors", from(2, 1024), "Number of pairs of a cloud that form loops, the most confident ones."});
     v(&O::iterations, {"iterations", from(1, 100), "Damped updates."});
+    v(&O::threads, {"threads", from(0, kInfinity), "0: one per core. Results do not depend on it."});
   }
   // clang-format on
 };

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_consistency/consistency_graph.hpp"
-#include "math/trigonometry.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "math/exponential.hpp"
+#include "math/trigonometry.hpp"
+
 namespace gpureg {
 namespace {
 
-constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+constexpr double kPi = 3.14159265358979323846, kDegrees = 180.0 / kPi;
+/// More than the functions of the floor are off.
+constexpr double kMargin = 1e-6;
 
 std::vector<ConsistencyCandidate> candidates_of(const RegistrationResult& result, bool turned,
                                                 const LoopConsistencyOptions& options) {
@@ -60,7 +64,7 @@ UnalignedIsometry3d ConsistencyEdge::pose(std::size_t candidate, std::uint32_t i
 ConsistencyGraph::ConsistencyGraph(const std::vector<Pair>& pairs,
                                    const std::vector<RegistrationResult>& results,
                                    const LoopConsistencyOptions& options)
-    : options_(options) {
+    : options_(options), floor_(options) {
   number_clouds(pairs);
   find_centres(pairs, results);
   find_edges(pairs, results);
@@ -148,15 +152,25 @@ void ConsistencyGraph::find_neighbors() {
   }
 }
 
+ConsistencyGraph::Floor::Floor(const LoopConsistencyOptions& options) {
+  const double at_floor =
+      -2 * portable::log(options.missed_closure_rate * options.false_closure_rate);
+  most = at_floor + kMargin;
+  const double angle = static_cast<double>(options.closing_angle) * std::sqrt(most) / kDegrees;
+  if (angle < kPi) cosine = portable::cos(angle) - kMargin;
+}
+
 double ConsistencyGraph::closing_ratio(const UnalignedIsometry3d& loop, double tolerance,
                                        std::initializer_list<Eigen::Vector3d> points) const {
-  const double angle =
-      kDegrees * portable::acos(std::clamp((loop.linear().trace() - 1.0) / 2.0, -1.0, 1.0));
+  const double cosine = (loop.linear().trace() - 1.0) / 2.0;
+  if (tolerance == 1.0 && cosine < floor_.cosine) return options_.missed_closure_rate;
   double squared = 0;
   for (const Eigen::Vector3d& p : points) squared = std::max(squared, (loop * p - p).squaredNorm());
-  const double turn = angle / (tolerance * static_cast<double>(options_.closing_angle));
   const double distance = tolerance * static_cast<double>(options_.closing_distance);
   const double shift = squared / (distance * distance);
+  if (shift > floor_.most) return options_.missed_closure_rate;
+  const double angle = kDegrees * portable::acos(std::clamp(cosine, -1.0, 1.0));
+  const double turn = angle / (tolerance * static_cast<double>(options_.closing_angle));
   return std::max(options_.missed_closure_rate,
                   portable::exp(-0.5 * (turn * turn + shift)) / options_.false_closure_rate);
 }

@@ -61,6 +61,14 @@ class ConsistencyGraph {
                        std::initializer_list<Eigen::Vector3d> points) const;
 
  private:
+  /// Errors from which the ratio is missed_closure_rate without its exponential: those of most
+  /// loops.
+  struct Floor {
+    explicit Floor(const LoopConsistencyOptions& options);
+    double most = 0;     ///< sum of the squared errors, in standard deviations
+    double cosine = -2;  ///< of the angle of a loop of three
+  };
+
   void number_clouds(const std::vector<Pair>& pairs);
   std::uint32_t number(std::uint32_t cloud) const;
   void find_centres(const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results);
@@ -68,6 +76,7 @@ class ConsistencyGraph {
   void find_neighbors();
 
   const LoopConsistencyOptions& options_;
+  Floor floor_;
   std::vector<std::uint32_t> clouds_;
   std::vector<Eigen::Vector3d> centres_;
   std::vector<ConsistencyEdge> edges_;

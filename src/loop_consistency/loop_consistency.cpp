@@ -13,15 +13,15 @@
 namespace gpureg {
 namespace {
 
-double probability(double value, const std::string& name) {
-  require(std::isfinite(value) && value >= 0 && value <= 1, name.c_str(), value,
-          "a probability in [0, 1]");
-  return value;
+/// @param name of the value, made where it is none: thousands of results are right.
+template <typename Name>
+void check_probability(double value, const Name& name) {
+  if (!(value >= 0 && value <= 1)) throw_option(name().c_str(), value, "a probability in [0, 1]");
 }
 
-const UnalignedIsometry3d& rigid(const UnalignedIsometry3d& pose, const std::string& name) {
-  require_rigid(pose, name);
-  return pose;
+template <typename Name>
+void check_rigid(const UnalignedIsometry3d& pose, const Name& name) {
+  if (!why_not_rigid(pose.matrix()).empty()) require_rigid(pose, name());
 }
 
 void check(const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results) {
@@ -29,14 +29,18 @@ void check(const std::vector<Pair>& pairs, const std::vector<RegistrationResult>
     throw InvalidArgument("results has " + std::to_string(results.size()) +
                           " entries, but pairs has " + std::to_string(pairs.size()));
   for (std::size_t p = 0; p < results.size(); ++p) {
-    const std::string name = "results[" + std::to_string(p) + "]";
-    probability(results[p].score, name + ".score");
+    const auto name = [p](const char* field) {
+      return [p, field] { return "results[" + std::to_string(p) + "]." + field; };
+    };
+    check_probability(results[p].score, name("score"));
     if (results[p].has_candidate)
-      rigid(results[p].target_from_source, name + ".target_from_source");
+      check_rigid(results[p].target_from_source, name("target_from_source"));
     for (std::size_t m = 0; m < results[p].modes.size(); ++m) {
-      const std::string mode = name + ".modes[" + std::to_string(m) + "]";
-      probability(results[p].modes[m].confidence, mode + ".confidence");
-      rigid(results[p].modes[m].target_from_source, mode + ".target_from_source");
+      const auto of_mode = [&](const char* field) {
+        return [&, field] { return name("modes")() + "[" + std::to_string(m) + "]." + field; };
+      };
+      check_probability(results[p].modes[m].confidence, of_mode("confidence"));
+      check_rigid(results[p].modes[m].target_from_source, of_mode("target_from_source"));
     }
   }
 }

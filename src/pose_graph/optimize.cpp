@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "common/host_threads.hpp"
 #include "gpureg/error.hpp"
 #include "pose_graph/components.hpp"
 #include "pose_graph/initialise.hpp"

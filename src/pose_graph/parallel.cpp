@@ -11,11 +11,6 @@
 
 namespace gpureg::pose_graph {
 
-int thread_count(int option) {
-  if (option > 0) return option;
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
 void for_ranges(int count, int threads, const std::function<void(int, int)>& body,
                 int shortest_range) {
   threads = std::min(threads, count / shortest_range);

@@ -7,9 +7,6 @@
 /// Threads of the solver. Which thread does what never changes a result.
 namespace gpureg::pose_graph {
 
-/// The number of threads that an option asks for; 0: one per core.
-int thread_count(int option);
-
 /// Calls body(begin, end) for consecutive ranges that cover [0, count). Ranges of fewer edges or
 /// nodes than the default of shortest_range take less time than starting a thread.
 void for_ranges(int count, int threads, const std::function<void(int, int)>& body,

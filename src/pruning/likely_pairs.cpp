@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <iterator>
 #include <string>
-#include <thread>
 
 #include "common/for_each_on.hpp"
 #include "common/validate.hpp"
@@ -17,11 +16,6 @@ constexpr std::size_t kSampledClouds = 256, kSampledFeatures = 400;
 /// The key points of each cloud are compared with those of so many others per neighbour that is
 /// asked for, and of at least so many.
 constexpr std::size_t kComparedPerNeighbor = 3, kLeastCompared = 100;
-
-std::size_t thread_count(int threads) {
-  return threads > 0 ? static_cast<std::size_t>(threads)
-                     : std::max<std::size_t>(1, std::thread::hardware_concurrency());
-}
 
 /// Evenly chosen rows.
 std::vector<float> some_of(const std::vector<float>& features, std::size_t dimension) {
@@ -60,7 +54,8 @@ void Options::validate() const {
 std::vector<Pair> likely_pairs(const std::vector<Summary>& clouds, const Options& options) {
   options.validate();
   check_same_words(clouds);
-  const std::size_t n = clouds.size(), threads = thread_count(options.threads);
+  const std::size_t n = clouds.size(),
+                    threads = static_cast<std::size_t>(thread_count(options.threads));
   const std::size_t compared =
       std::max(kLeastCompared, kComparedPerNeighbor * std::size_t{options.neighbors});
   const LikenessModel model(clouds, threads);
@@ -102,7 +97,7 @@ std::vector<Pair> likely_pairs(const std::vector<PreparedCloud>& clouds, const O
   const Matrix words = learn_words(views, options.words);
   std::vector<Summary> summaries(clouds.size());
   for_each_on(
-      thread_count(options.threads), clouds.size(), [] { return 0; },
+      static_cast<std::size_t>(thread_count(options.threads)), clouds.size(), [] { return 0; },
       [&](std::size_t k, int) { summaries[k] = summarize(clouds[k], words); });
   return likely_pairs(summaries, options);
 }

@@ -289,8 +289,10 @@ Reconstruction reconstruct_from_poses(std::size_t scans, const std::vector<Pair>
   check_pairs(scans, pairs);
   Reconstruction map;
   map.odometry = checked_odometry(scans, odometry, options.drift);
+  LoopConsistencyOptions consistency_options = options.consistency;
+  consistency_options.threads = options.threads;
   const std::vector<PairConsistency> consistency =
-      loop_consistency(pairs, results, options.consistency);
+      loop_consistency(pairs, results, consistency_options);
   const PairGraph graph = graph_of_pairs(scans, pairs, results, consistency, options);
 
   std::vector<char> unconfirmed(graph.graph.edges.size(), 0);

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "common/host_threads.hpp"
 #include "common/validate.hpp"
 #include "gpureg/reconstruction.hpp"
 #include "gpureg/surface_set.hpp"
@@ -100,7 +101,7 @@ class Refiner {
           const RefineOptions& options)
       : map_(map),
         options_(options),
-        threads_(pose_graph::thread_count(options.threads)),
+        threads_(thread_count(options.threads)),
         system_(surfaces.size(), map),
         poses_(surfaces.size()),
         spheres_(surfaces.size()),

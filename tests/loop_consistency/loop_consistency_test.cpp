@@ -205,6 +205,31 @@ TEST(LoopConsistency, PathsCountTheirEdges) {
   }
 }
 
+TEST(LoopConsistency, ThreadsDoNotMatter) {
+  Set set(24);
+  set.add_all(0.6);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> number(0, 1);
+  for (RegistrationResult& result : set.results) {
+    RegistrationMode other = result.modes[0];
+    other.target_from_source = kWrong * other.target_from_source;
+    other.confidence = 0.1 * number(random);
+    result.modes.push_back(other);
+    if (number(random) < 0.3)
+      std::swap(result.modes[0].target_from_source, result.modes[1].target_from_source);
+    result.target_from_source = result.modes[0].target_from_source;
+  }
+  LoopConsistencyOptions options;
+  options.threads = 1;
+  const auto alone = set.score(options);
+  options.threads = 5;
+  const auto shared = set.score(options);
+  for (std::size_t p = 0; p < alone.size(); ++p) {
+    EXPECT_EQ(alone[p].confidence, shared[p].confidence) << p;
+    EXPECT_EQ(alone[p].mode, shared[p].mode) << p;
+  }
+}
+
 TEST(LoopConsistency, OrderDoesNotMatter) {
   Set set(9);
   std::mt19937 random(3);
