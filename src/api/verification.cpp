@@ -9,6 +9,7 @@
 #include "api/pair_input.hpp"
 #include "api/variants.hpp"
 #include "api/verify_by_surfaces.hpp"
+#include "common/for_each_on.hpp"
 #include "common/rigid.hpp"
 #include "common/stop_scope.hpp"
 #include "confidence/calibrate_modes.hpp"
@@ -114,6 +115,13 @@ void set_confidences(const VerifiedPair& pair, const PairOutcome& outcome, const
 
 using Verifications = std::vector<std::vector<PoseVerification>>;
 
+/// Calls work(k) for the pairs of a chunk. Evidence and confidence of a pose take tens of
+/// microseconds on the host, too much for one thread where a device measures thousands per second.
+template <typename Work>
+void for_each_pair(const Engine& engine, std::size_t count, const Work& work) {
+  for_each_on(std::min<std::size_t>(engine.host_threads(), 1 + count / 16), count, work);
+}
+
 /// Verifies the pairs chunk by chunk. conclude(engine, inputs, pairs, outcomes, results): sets the
 /// confidences of a chunk. matches: given ones, for all pairs; empty: of the features.
 template <typename Conclude>
@@ -155,9 +163,9 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
     }
     const std::vector<PairOutcome> outcomes =
         verify_all(engine, inputs, local, by_evidence, refine);
-    Verifications made;
-    for (std::size_t v = 0; v < outcomes.size(); ++v)
-      made.push_back(measured(verified[v], outcomes[v]));
+    Verifications made(outcomes.size());
+    for_each_pair(engine, made.size(),
+                  [&](std::size_t v) { made[v] = measured(verified[v], outcomes[v]); });
     conclude(engine, inputs, verified, outcomes, made);
     for (std::size_t v = begin; v < end; ++v) {
       const std::size_t p = variants[v].pair;
@@ -192,10 +200,11 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
                         if (verification.search_alternatives)
                           align_all(engine, span_of(inputs), verified.front().options,
                                     {found.data(), found.size()});
-                        for (std::size_t v = 0; v < made.size(); ++v)
+                        for_each_pair(engine, made.size(), [&](std::size_t v) {
                           set_confidences(verified[v], outcomes[v],
                                           verification.search_alternatives ? &found[v] : nullptr,
                                           made[v]);
+                        });
                       });
 }
 
