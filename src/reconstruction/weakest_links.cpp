@@ -84,9 +84,13 @@ void walk(std::uint32_t root, const std::vector<std::vector<std::uint32_t>>& tre
 std::vector<Link> weakest_links(const Reconstruction& map) {
   const std::vector<Edge> edges = known_edges(map);
   const auto tree = spanning_forest(map.scans.size(), edges);
+  std::vector<std::vector<const Edge*>> edges_of(map.islands.size());
+  for (const Edge& edge : edges) edges_of[map.scans[edge.source].island].push_back(&edge);
   std::vector<Link> links;
-  for (const Island& island : map.islands) {
-    Order order(map.scans.size());
+  Order order(map.scans.size());
+  for (std::size_t place = 0; place < map.islands.size(); ++place) {
+    const Island& island = map.islands[place];
+    order.order.clear();
     walk(island.scans.front(), tree, order);
     for (const std::uint32_t top : island.scans) {
       if (top == island.scans.front()) continue;
@@ -98,12 +102,10 @@ std::vector<Link> weakest_links(const Reconstruction& map) {
       const bool lone = size == 1 || size + 1 == island.scans.size();
       Link link;
       Connection connection;
-      for (const Edge& edge : edges) {
-        if (map.scans[edge.source].island != map.scans[top].island ||
-            below(edge.source) == below(edge.target))
-          continue;
-        connection.add(edge, lone);
-        ++(edge.accepted ? link.accepted : link.rejected);
+      for (const Edge* edge : edges_of[place]) {
+        if (below(edge->source) == below(edge->target)) continue;
+        connection.add(*edge, lone);
+        ++(edge->accepted ? link.accepted : link.rejected);
       }
       link.confidence = connection.confidence();
       const bool smaller = 2 * size <= island.scans.size();

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "common/for_each_on.hpp"
 #include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "fields/audit.hpp"
@@ -27,6 +28,8 @@ namespace {
 
 /// Edges are taken out and the graph solved again at most so often.
 constexpr int kMostRounds = 12;
+/// A mode below takes no part.
+constexpr double kLeastOfMode = 0.02;
 
 void check_poses(const std::vector<PreparedCloud>& clouds,
                  const std::vector<UnalignedIsometry3d>& world_from_scan) {
@@ -116,13 +119,36 @@ bool held_by_odometry(const std::vector<std::uint32_t>& part,
                      [&](const Odometry& edge) { return divides(part, edge.source, edge.target); });
 }
 
+/// The results, of each the modes up to the last that may still take part: what is left out is most
+/// of the memory of a large set. Confidences only fall from here on.
+std::vector<RegistrationResult> with_likely_modes(const std::vector<RegistrationResult>& results,
+                                                  const Options& options) {
+  const double least = std::min(kLeastOfMode, options.consistency.min_alternative_confidence);
+  std::vector<RegistrationResult> out(results.size());
+  const auto copy = [&](std::size_t k) {
+    RegistrationResult one = results[k];
+    std::size_t kept = one.modes.size();
+    // What is no mode stays, and is named where the results are checked.
+    const auto unlikely = [&](const RegistrationMode& mode) {
+      return mode.confidence >= 0 && mode.confidence < least &&
+             why_not_rigid(mode.target_from_source.matrix()).empty();
+    };
+    while (kept > 1 && unlikely(one.modes[kept - 1])) --kept;
+    one.modes.resize(kept);
+    one.modes.shrink_to_fit();
+    out[k] = std::move(one);
+  };
+  for_each_on(static_cast<std::size_t>(thread_count(options.threads)), out.size(), copy);
+  return out;
+}
+
 /// A mode that the audit has ruled out takes no part any more.
 void rule_out(const Edge& edge, std::vector<RegistrationResult>& results) {
   RegistrationResult& result = results[edge.pair];
   if (edge.mode < result.modes.size()) result.modes[edge.mode].confidence = 0;
   const bool none =
       std::all_of(result.modes.begin(), result.modes.end(),
-                  [](const RegistrationMode& mode) { return mode.confidence < 0.02; });
+                  [](const RegistrationMode& mode) { return mode.confidence < kLeastOfMode; });
   if (none) result.has_candidate = false;
 }
 
@@ -184,12 +210,12 @@ AuditedReconstruction reconstruct_and_audit(
     const RegistrationOptions& registration, const AuditOptions& audit_options) {
   audit_options.validate();
   AuditedReconstruction out;
-  std::vector<RegistrationResult> left = results;
+  std::vector<RegistrationResult> left = with_likely_modes(results, options);
   std::vector<Edge> ruled_out;
   const std::vector<Eigen::Vector3d> sensors = sensors_of(clouds);
   out.places_look_alike =
       odometry.empty() &&
-      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, results, options), sensors);
+      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, left, options), sensors);
   if (out.places_look_alike) ruled_out = keep_to_the_path(sensors, pairs, options, left);
   hear_companions(context, clouds, pairs, registration, audit_options, left);
   for (int round = 0;; ++round) {

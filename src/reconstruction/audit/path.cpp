@@ -117,14 +117,6 @@ Path path_of(const std::vector<Eigen::Vector3d>& sensors, const std::vector<Pair
   return path;
 }
 
-/// Results of the pairs that are trusted.
-std::vector<RegistrationResult> only(std::vector<RegistrationResult> results,
-                                     const std::vector<char>& trusted) {
-  for (std::size_t k = 0; k < results.size(); ++k)
-    if (!trusted[k]) results[k].has_candidate = false;
-  return results;
-}
-
 /// Where islands would lie to each other by one mode of a pair.
 struct Placement {
   double confidence = 0;
@@ -303,9 +295,11 @@ std::vector<char> pairs_along_the_path(const std::vector<Eigen::Vector3d>& senso
     trusted[k] = gap_of(pairs[k]) <= path.near && results[k].has_candidate &&
                  step_of(pairs[k], results[k].target_from_source, sensors) <=
                      gap_of(pairs[k]) * path.max_step;
+  std::vector<RegistrationResult> of_trusted = results;
   for (int round = 0; round < kMostPasses; ++round) {
-    const Reconstruction map =
-        reconstruct_from_poses(sensors.size(), pairs, only(results, trusted), options);
+    for (std::size_t k = 0; k < results.size(); ++k)
+      of_trusted[k].has_candidate = trusted[k] && results[k].has_candidate;
+    const Reconstruction map = reconstruct_from_poses(sensors.size(), pairs, of_trusted, options);
     if (!Growth(map, path, sensors).grow(pairs, results, trusted)) break;
   }
   return trusted;
