@@ -107,7 +107,7 @@ bool BlockCholesky::process(Front& front, const BlockMatrix& matrix) {
     extend_add(work, size, fronts_[child].update, fronts_[child].parent_slot);
     std::vector<double>().swap(fronts_[child].update);
   }
-  if (!partial_cholesky(work.data(), static_cast<int>(size), static_cast<int>(columns)))
+  if (!partial_cholesky(work.data(), static_cast<int>(size), static_cast<int>(columns), threads_))
     return false;
   front.factor.assign(work.begin(), work.begin() + static_cast<std::ptrdiff_t>(size * columns));
   const std::size_t rest = scalars(rows);

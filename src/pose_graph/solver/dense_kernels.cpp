@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "common/for_each_on.hpp"
+
 #if defined(__GNUC__) && defined(__x86_64__)
 #define GPUREG_AVX2_KERNELS 1
 #endif
@@ -71,39 +73,79 @@ __attribute__((always_inline)) inline bool factorise_panel(double* m, std::size_
   return true;
 }
 
-__attribute__((always_inline)) inline bool run(double* m, int size, int columns) {
-  const std::size_t ld = static_cast<std::size_t>(size);
-  for (int begin = 0; begin < columns; begin += kPanel) {
-    const int end = std::min(begin + kPanel, columns), depth = end - begin;
-    if (!factorise_panel(m, ld, size, begin, end)) return false;
-    const double* panel = m + begin * ld;
-    for (int j = end; j < size; j += kTileColumns) {
-      const int tile_columns = std::min(kTileColumns, size - j);
-      int i = j;
-      if (tile_columns == kTileColumns)
-        for (; i + kTileRows <= size; i += kTileRows)
-          update_tile(m + i + j * ld, panel + i, panel + j, ld, depth);
-      if (i < size)
-        update_border(m + i + j * ld, panel + i, panel + j, ld, depth, size - i, tile_columns);
-    }
+/// Columns [j, last) of what is left, by a panel of columns [begin, end).
+__attribute__((always_inline)) inline void update_columns(double* m, std::size_t ld, int size,
+                                                          int begin, int end, int j, int last) {
+  const int depth = end - begin;
+  const double* panel = m + begin * ld;
+  for (; j < last; j += kTileColumns) {
+    const int tile_columns = std::min(kTileColumns, size - j);
+    int i = j;
+    if (tile_columns == kTileColumns)
+      for (; i + kTileRows <= size; i += kTileRows)
+        update_tile(m + i + j * ld, panel + i, panel + j, ld, depth);
+    if (i < size)
+      update_border(m + i + j * ld, panel + i, panel + j, ld, depth, size - i, tile_columns);
   }
-  return true;
 }
 
+/// One processor's version of both.
+struct Kernels {
+  bool (*factorise)(double* m, std::size_t ld, int size, int begin, int end);
+  void (*update)(double* m, std::size_t ld, int size, int begin, int end, int j, int last);
+};
+
+constexpr Kernels kPlain = {[](double* m, std::size_t ld, int size, int begin, int end) {
+                              return factorise_panel(m, ld, size, begin, end);
+                            },
+                            [](double* m, std::size_t ld, int size, int begin, int end, int j,
+                               int last) { update_columns(m, ld, size, begin, end, j, last); }};
+
 #ifdef GPUREG_AVX2_KERNELS
-__attribute__((target("avx2"))) bool run_avx2(double* m, int size, int columns) {
-  return run(m, size, columns);
+__attribute__((target("avx2"))) bool factorise_avx2(double* m, std::size_t ld, int size, int begin,
+                                                    int end) {
+  return factorise_panel(m, ld, size, begin, end);
+}
+__attribute__((target("avx2"))) void update_avx2(double* m, std::size_t ld, int size, int begin,
+                                                 int end, int j, int last) {
+  update_columns(m, ld, size, begin, end, j, last);
 }
 #endif
+
+const Kernels& kernels() {
+#ifdef GPUREG_AVX2_KERNELS
+  static constexpr Kernels kAvx2 = {factorise_avx2, update_avx2};
+  static const bool avx2 = __builtin_cpu_supports("avx2");
+  if (avx2) return kAvx2;
+#endif
+  return kPlain;
+}
+
+/// Multiplications of a thread that take longer than its start, and columns that it takes at once.
+constexpr double kOfThread = 2e6;
+constexpr int kStrip = 16 * kTileColumns;
 
 }  // namespace
 
-bool partial_cholesky(double* matrix, int size, int columns) {
-#ifdef GPUREG_AVX2_KERNELS
-  static const bool avx2 = __builtin_cpu_supports("avx2");
-  if (avx2) return run_avx2(matrix, size, columns);
-#endif
-  return run(matrix, size, columns);
+bool partial_cholesky(double* matrix, int size, int columns, int threads) {
+  const Kernels& run = kernels();
+  const std::size_t ld = static_cast<std::size_t>(size);
+  for (int begin = 0; begin < columns; begin += kPanel) {
+    const int end = std::min(begin + kPanel, columns);
+    if (!run.factorise(matrix, ld, size, begin, end)) return false;
+    const double rest = size - end, work = 0.5 * rest * rest * (end - begin);
+    const int used = static_cast<int>(std::min<double>(threads, work / kOfThread));
+    if (used < 2) {
+      run.update(matrix, ld, size, begin, end, end, size);
+      continue;
+    }
+    const auto strips = static_cast<std::size_t>((size - end + kStrip - 1) / kStrip);
+    for_each_on(static_cast<std::size_t>(used), strips, [&](std::size_t strip) {
+      const int first = end + static_cast<int>(strip) * kStrip;
+      run.update(matrix, ld, size, begin, end, first, std::min(first + kStrip, size));
+    });
+  }
+  return true;
 }
 
 }  // namespace gpureg::pose_graph

@@ -8,6 +8,7 @@ namespace gpureg::pose_graph {
 /// Factorises the first `columns` columns of the symmetric size x size matrix (lower triangle,
 /// leading dimension size): these columns become those of the Cholesky factor, the rest becomes the
 /// Schur complement. Writes to the upper triangle too. Returns false where a pivot is not positive.
-bool partial_cholesky(double* matrix, int size, int columns);
+/// The bits do not depend on threads; small matrices use one.
+bool partial_cholesky(double* matrix, int size, int columns, int threads);
 
 }  // namespace gpureg::pose_graph
