@@ -29,6 +29,7 @@ METHODS = {
     "kiss_matcher_010": ("kiss", "Coarse"),
     "sc2_pcr": ("sc2_pcr", "SecondOrder"),
     "teaser": ("teaser", "Teaser"),
+    "turboreg": ("turboreg", "Turbo"),
     "loopsmart_open3d_icp": ("refinement", "Open3dIcp"),
     "loopsmart_small_gicp": ("refinement", "SmallGicp"),
 }
