@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846, kDegrees = 180.0 / kPi;
 /// More than the functions of the floor are off.
-constexpr double kMargin = 1e-6;
+constexpr double kFloorMargin = 1e-6;
 
 std::vector<ConsistencyCandidate> candidates_of(const RegistrationResult& result, bool turned,
                                                 const LoopConsistencyOptions& options) {
@@ -155,9 +155,9 @@ void ConsistencyGraph::find_neighbors() {
 ConsistencyGraph::Floor::Floor(const LoopConsistencyOptions& options) {
   const double at_floor =
       -2 * portable::log(options.missed_closure_rate * options.false_closure_rate);
-  most = at_floor + kMargin;
+  most = at_floor + kFloorMargin;
   const double angle = static_cast<double>(options.closing_angle) * std::sqrt(most) / kDegrees;
-  if (angle < kPi) cosine = portable::cos(angle) - kMargin;
+  if (angle < kPi) cosine = portable::cos(angle) - kFloorMargin;
 }
 
 double ConsistencyGraph::closing_ratio(const UnalignedIsometry3d& loop, double tolerance,

@@ -29,7 +29,7 @@ namespace {
 /// Edges are taken out and the graph solved again at most so often.
 constexpr int kMostRounds = 12;
 /// A mode below takes no part.
-constexpr double kLeastOfMode = 0.02;
+constexpr double kLeastPossible = 0.02;
 
 void check_poses(const std::vector<PreparedCloud>& clouds,
                  const std::vector<UnalignedIsometry3d>& world_from_scan) {
@@ -123,7 +123,7 @@ bool held_by_odometry(const std::vector<std::uint32_t>& part,
 /// of the memory of a large set. Confidences only fall from here on.
 std::vector<RegistrationResult> with_likely_modes(const std::vector<RegistrationResult>& results,
                                                   const Options& options) {
-  const double least = std::min(kLeastOfMode, options.consistency.min_alternative_confidence);
+  const double least = std::min(kLeastPossible, options.consistency.min_alternative_confidence);
   std::vector<RegistrationResult> out(results.size());
   const auto copy = [&](std::size_t k) {
     RegistrationResult one = results[k];
@@ -148,7 +148,7 @@ void rule_out(const Edge& edge, std::vector<RegistrationResult>& results) {
   if (edge.mode < result.modes.size()) result.modes[edge.mode].confidence = 0;
   const bool none =
       std::all_of(result.modes.begin(), result.modes.end(),
-                  [](const RegistrationMode& mode) { return mode.confidence < kLeastOfMode; });
+                  [](const RegistrationMode& mode) { return mode.confidence < kLeastPossible; });
   if (none) result.has_candidate = false;
 }
 
