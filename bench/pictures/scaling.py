@@ -3,7 +3,8 @@
 """Draws cost as the work grows. Needs matplotlib.
 
 bench/notes/images/scaling.png: pairs and fragments, from bench/results/pipeline.json;
-bench/notes/images/map_scaling.png: a scan in a map, from bench/results/locate_city.json.
+bench/notes/images/map_scaling.png: a scan in a map, from bench/results/locate_city.json;
+bench/notes/images/set_scaling.png: sets of several buildings, from bench/results/sets.json, where that is.
 """
 
 import json
@@ -108,5 +109,37 @@ def draw_pairs():
     figure.savefig(ROOT / "bench/notes/images/scaling.png", dpi=110)
 
 
+def draw_sets():
+    """All pairs and --prune beside each other, by stage."""
+    rows = record("sets.json")["runs"]
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), constrained_layout=True, sharey=True)
+    for place, (title, chosen) in zip(
+        axes,
+        (
+            ("all pairs", [row for row in rows if not row["prune"]]),
+            ("--prune", [row for row in rows if row["prune"]]),
+        ),
+        strict=True,
+    ):
+        scans = [row["scans"] for row in chosen]
+        for key, label in (
+            ("prepare", "prepare"),
+            ("prune", "prune"),
+            ("align", "align"),
+            ("graph", "audited map"),
+            ("all", "from files to the map"),
+        ):
+            seconds = [row["seconds"][key] for row in chosen]
+            if max(seconds, default=0) > 0:
+                place.loglog(scans, seconds, marker="o", label=label)
+        place.set(xlabel="scans", title=title)
+        place.grid(True, alpha=0.3)
+        place.legend(frameon=False)
+    axes[0].set_ylabel("s")
+    figure.savefig(ROOT / "bench/notes/images/set_scaling.png", dpi=110)
+
+
 draw_pairs()
 draw_maps()
+if (ROOT / "bench/results/sets.json").exists():
+    draw_sets()
