@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "algorithm/mode_selection.hpp"
 #include "confidence/degeneracy_search.hpp"
 #include "cuda/common/stage_data.hpp"
 #include "cuda/device/exec.hpp"
@@ -62,11 +63,14 @@ Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seed
 void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
                       Candidates& candidates, const RegistrationOptions& options);
 /// Distinct poses with the highest coarse_score.
-Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationOptions& options);
+Modes select_modes(Exec& exec, const Candidates& candidates, const ModeSelection& selection);
+/// Modes as candidates, with the matches that they align: to score and select them again.
+Candidates candidates_from_modes(Exec& exec, const MatchSets& matches, const Modes& modes,
+                                 const RegistrationOptions& options);
 /// The first refinement: on a sample, with the wide kernel.
 void refine_roughly(Exec& exec, Span<const PairView> pairs, Modes& modes,
                     const RegistrationOptions& options);
-/// The second refinement: on all points, with a narrower kernel.
+/// The second refinement: with a narrower kernel, on a sample and then on all points.
 void polish_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
                   const RegistrationOptions& options);
 /// Merges modes that refinement moved to the same pose, within a share of the limits of a mode;

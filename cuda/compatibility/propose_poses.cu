@@ -90,35 +90,74 @@ __global__ void __launch_bounds__(kThreads)
   atomicAdd(&e.inliers, inliers);
 }
 
-}  // namespace
+/// Counts the matches that each candidate aligns.
+void add_matches(Exec& exec, const MatchSets& matches, Candidates& candidates,
+                 const RegistrationOptions& options) {
+  const std::size_t pairs = matches.room.entries();
+  const std::uint32_t largest = matches.room.largest,
+                      candidate_blocks = blocks_for(std::min(candidates.most, largest), kThreads),
+                      per_block = items_per_block(exec, candidate_blocks * pairs, largest,
+                                                  kMatchesPerBlock, kTile);
+  const float squared_distance =
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance;
+  launch(
+      exec, "count_matches", count_matches,
+      {{candidate_blocks, static_cast<unsigned>(pairs), blocks_for(largest, per_block)}, kThreads},
+      matches.view(), matches.room.on_device.data(), matches.count.data(), per_block,
+      candidates.most, candidates.count.data(), squared_distance, candidates.pose.data(),
+      candidates.matches.data());
+}
 
-Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds,
-                         const RegistrationOptions& options) {
-  const std::size_t pairs = matches.room.entries(), places = pairs * seeds.most;
-  const unsigned pair_count = static_cast<unsigned>(pairs);
+/// A thread block per pair.
+__global__ void copy_modes(std::uint32_t most, const Mode* modes, const std::uint32_t* mode_count,
+                           Pose<float>* pose, std::uint32_t* seed, MatchEvidence* matches,
+                           std::uint32_t* count) {
+  const std::uint32_t p = blockIdx.x, k = threadIdx.x, size = mode_count[p];
+  if (k == 0) count[p] = size;
+  if (k >= size) return;
+  const std::size_t at = static_cast<std::size_t>(p) * most + k;
+  pose[at] = narrow(modes[at].pose);
+  seed[at] = modes[at].seed;
+  matches[at] = {0, 0, 0};
+}
+
+Candidates candidates_of(Exec& exec, std::size_t pairs, std::uint32_t most) {
+  const std::size_t places = pairs * most;
   Candidates out;
-  out.most = seeds.most;
+  out.most = most;
   out.pose = exec.buffer<Pose<float>>(places);
   out.seed = exec.buffer<std::uint32_t>(places);
   out.matches = exec.buffer<MatchEvidence>(places);
   out.coarse_score = exec.buffer<float>(places);
   out.count = exec.filled<std::uint32_t>(pairs, 0);
-  const std::uint32_t largest = matches.room.largest;
-  if (largest == 0) return out;
+  return out;
+}
+
+}  // namespace
+
+Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds,
+                         const RegistrationOptions& options) {
+  const std::size_t pairs = matches.room.entries();
+  Candidates out = candidates_of(exec, pairs, seeds.most);
+  if (matches.room.largest == 0) return out;
   const SeedPoses found = fit_seeds(exec, matches, seeds, options);
-  launch(exec, "keep_valid", keep_valid, {pair_count, kThreads}, seeds.count.data(),
-         seeds.match.data(), found.valid.data(), found.pose.data(), seeds.most, out.pose.data(),
-         out.seed.data(), out.matches.data(), out.count.data());
-  const std::uint32_t most_seeds = std::min(seeds.most, largest);
-  const float squared_distance =
-      options.compatibility.consensus_distance * options.compatibility.consensus_distance;
-  const std::uint32_t candidate_blocks = blocks_for(most_seeds, kThreads),
-                      per_block = items_per_block(exec, candidate_blocks * pairs, largest,
-                                                  kMatchesPerBlock, kTile);
-  launch(exec, "count_matches", count_matches,
-         {{candidate_blocks, pair_count, blocks_for(largest, per_block)}, kThreads}, matches.view(),
-         matches.room.on_device.data(), matches.count.data(), per_block, out.most, out.count.data(),
-         squared_distance, out.pose.data(), out.matches.data());
+  launch(exec, "keep_valid", keep_valid, {static_cast<unsigned>(pairs), kThreads},
+         seeds.count.data(), seeds.match.data(), found.valid.data(), found.pose.data(), seeds.most,
+         out.pose.data(), out.seed.data(), out.matches.data(), out.count.data());
+  add_matches(exec, matches, out, options);
+  return out;
+}
+
+Candidates candidates_from_modes(Exec& exec, const MatchSets& matches, const Modes& modes,
+                                 const RegistrationOptions& options) {
+  const std::size_t pairs = matches.room.entries();
+  Candidates out = candidates_of(exec, pairs, modes.most);
+  if (matches.room.largest == 0) return out;
+  static_assert(limits::kMaxModes <= kThreads, "a thread per mode");
+  launch(exec, "copy_modes", copy_modes, {static_cast<unsigned>(pairs), kThreads}, modes.most,
+         modes.mode.data(), modes.count.data(), out.pose.data(), out.seed.data(),
+         out.matches.data(), out.count.data());
+  add_matches(exec, matches, out, options);
   return out;
 }
 

@@ -267,14 +267,14 @@ __global__ void __launch_bounds__(32)
   if (lane == 0) counts[blockIdx.x] = count;
 }
 
-void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes,
+void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes, std::uint32_t max_iterations,
                 const RegistrationOptions& options, float kernel_width, double settled) {
   RefineModes batch{};
   batch.pairs = pairs.pairs.data();
   batch.most = modes.most;
   batch.modes = modes.mode.data();
   batch.count = modes.count.data();
-  batch.max_iterations = options.refine.max_iterations;
+  batch.max_iterations = max_iterations;
   batch.max_distance = options.prepare.max_correspondence_distance;
   batch.kernel_width = kernel_width;
   batch.min_cosine =
@@ -299,15 +299,20 @@ void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes,
 void refine_roughly(Exec& exec, Span<const PairView> pairs, Modes& modes,
                     const RegistrationOptions& options) {
   if (options.refine.max_iterations == 0) return;
-  refine_all(exec, sample_pairs(exec, pairs, 2 * options.evidence.sample, false), modes, options,
+  refine_all(exec, sample_pairs(exec, pairs, refinement_sample(options.evidence), false), modes,
+             std::min(kRoughIterations, options.refine.max_iterations), options,
              options.refine.kernel_width, kRoughSettled);
 }
 
 void polish_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
                   const RegistrationOptions& options) {
   if (options.refine.max_iterations == 0) return;
-  refine_all(exec, whole_pairs(exec, pairs), modes, options,
-             kPolishKernel * options.refine.kernel_width, kPolishSettled);
+  const float kernel_width = kPolishKernel * options.refine.kernel_width;
+  refine_all(exec, sample_pairs(exec, pairs, refinement_sample(options.evidence), false), modes,
+             options.refine.max_iterations, options, kernel_width, kPolishSettled);
+  refine_all(exec, whole_pairs(exec, pairs), modes,
+             std::min(kFinalIterations, options.refine.max_iterations), options, kernel_width,
+             kPolishSettled);
 }
 
 void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options, float share) {

@@ -48,7 +48,7 @@ struct RegistrationMode {
   /// Probability that the pose is correct and the clouds overlap by 30 % or more.
   double overlap_confidence = 0;
   PoseEvidence evidence;
-  /// Rank by the coarse score among the modes before refinement, from 0.
+  /// Rank by the coarse score among the modes after the first refinement, from 0.
   std::uint32_t rank_before_refinement = 0;
   /// The clouds cannot tell this pose from the first one: a symmetry of the larger cloud lies
   /// between them, and the odds of both are similar. False for the first pose itself.

@@ -88,7 +88,7 @@ void bind_mode(py::module_& m) {
                     "cloud lies between them.")
       .def_readonly("evidence", &M::evidence, "Evidence for and against the pose.")
       .def_readonly("rank_before_refinement", &M::rank_before_refinement,
-                    "Rank by the coarse score among the modes before refinement, from 0.")
+                    "Rank by the coarse score among the modes after the first refinement, from 0.")
       .def(
           "to_dict", [](const M& o) { return state_of(o); },
           "All values as plain Python and numpy objects.")

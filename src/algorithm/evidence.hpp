@@ -89,7 +89,7 @@ GPUREG_HD float smaller_share(const MatchEvidence& m, std::uint64_t source_total
 /// halves the score.
 constexpr float kViolationPenalty = 4.0f;
 
-/// Coarse score of a candidate, which orders candidates before refinement: root of the match
+/// Coarse score of a candidate, for the order before and after the first refinement: root of match
 /// support times the normal-weighted overlap of both sides, reduced by free-space violations.
 /// match_share: in [0, 1]; weight_a, weight_b: normal weight of each side's whole sample.
 GPUREG_HD float coarse_score(float match_share, const SideEvidence& a, float weight_a,

@@ -23,10 +23,12 @@ void align_by_compatibility(Exec& exec, Span<const PairInput> inputs, Span<const
   auto candidates = propose_poses(exec, matches, seeds, options);
   const auto proposed = exec.mark();
   score_candidates(exec, pairs, matches, candidates, options);
-  auto modes = select_modes(exec, candidates, options);
+  auto modes = select_modes(exec, candidates, first_selection(options.evidence));
   const auto ranked = exec.mark();
   refine_roughly(exec, pairs, modes, options);
-  merge_modes(exec, modes, options, kRoughMerge);
+  auto refined_once = candidates_from_modes(exec, matches, modes, options);
+  score_candidates(exec, pairs, matches, refined_once, options);
+  modes = select_modes(exec, refined_once, second_selection(options.evidence));
   polish_modes(exec, pairs, modes, options);
   merge_modes(exec, modes, options, 1.0f);
   const auto refined = exec.mark();

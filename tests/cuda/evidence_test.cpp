@@ -156,8 +156,8 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
                            host(on_cuda, cuda_candidates.coarse_score.data() + at, size)));
   }
 
-  auto modes = cpu::select_modes(on_cpu, candidates, options);
-  auto cuda_modes = cuda::select_modes(on_cuda, cuda_candidates, options);
+  auto modes = cpu::select_modes(on_cpu, candidates, first_selection(options.evidence));
+  auto cuda_modes = cuda::select_modes(on_cuda, cuda_candidates, first_selection(options.evidence));
   const auto expect_same_modes = [&](const char* stage) {
     const auto mode_count = host(on_cuda, cuda_modes.count.data(), count);
     for (std::size_t p = 0; p < count; ++p) {
@@ -172,9 +172,13 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   cpu::refine_roughly(on_cpu, cpu_views, modes, options);
   cuda::refine_roughly(on_cuda, cuda_views, cuda_modes, options);
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("roughly refined modes"));
-  cpu::merge_modes(on_cpu, modes, options, kRoughMerge);
-  cuda::merge_modes(on_cuda, cuda_modes, options, kRoughMerge);
-  ASSERT_NO_FATAL_FAILURE(expect_same_modes("modes merged before the second refinement"));
+  auto refined_once = cpu::candidates_from_modes(on_cpu, matches, modes, options);
+  auto cuda_refined_once = cuda::candidates_from_modes(on_cuda, cuda_matches, cuda_modes, options);
+  cpu::score_candidates(on_cpu, cpu_views, matches, refined_once, options);
+  cuda::score_candidates(on_cuda, cuda_views, cuda_matches, cuda_refined_once, options);
+  modes = cpu::select_modes(on_cpu, refined_once, second_selection(options.evidence));
+  cuda_modes = cuda::select_modes(on_cuda, cuda_refined_once, second_selection(options.evidence));
+  ASSERT_NO_FATAL_FAILURE(expect_same_modes("modes of the second refinement"));
   cpu::polish_modes(on_cpu, cpu_views, modes, options);
   cuda::polish_modes(on_cuda, cuda_views, cuda_modes, options);
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("refined modes"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which modes remain between the two refinements.
+// Which candidates become modes, and which modes remain between and after the refinements.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -37,6 +37,58 @@ TEST(MergeModes, WithinAShareOfTheLimits) {
     EXPECT_EQ(seeds_of(modes[0]), kept) << share;
     EXPECT_TRUE(modes[1].empty());
   }
+}
+
+/// Candidates that are half a metre apart, with these scores, as their own seeds.
+std::vector<Candidates> candidates_with(const std::vector<float>& scores) {
+  Candidates out;
+  for (const float score : scores) {
+    const auto k = static_cast<std::uint32_t>(out.seed.size());
+    out.pose.push_back(narrow(mode_at(0, 0.5 * k, k).pose));
+    out.seed.push_back(k);
+    out.matches.push_back({0, 0, 0});
+    out.coarse_score.push_back(score);
+  }
+  return {out};
+}
+
+TEST(SelectModes, WeakOnesOnlyAmongTheFirst) {
+  Exec exec(1);
+  ModeSelection selection{mode_limits(10, 0.4f, 1.0f), 4, 2, 0.02f, 0.5f};
+  const auto selected = [&](const std::vector<float>& scores) {
+    return seeds_of(select_modes(exec, candidates_with(scores), selection)[0]);
+  };
+  using Seeds = std::vector<std::uint32_t>;
+  EXPECT_EQ(selected({0.1f, 0.4f, 0.3f, 0.2f, 0.19f}), (Seeds{1, 2, 3})) << "half of the best";
+  EXPECT_EQ(selected({0.01f, 0.019f, 0.02f, 0.03f}), (Seeds{3, 2})) << "the least score";
+  EXPECT_EQ(selected({0.01f, 0.0f, 0.005f}), (Seeds{0, 2})) << "the first need no score";
+  EXPECT_EQ(selected({1, 1, 1, 1, 1, 1}), (Seeds{0, 1, 2, 3})) << "no more than the most";
+  selection.within = mode_limits(10, 0.6f, 1.0f);
+  EXPECT_EQ(selected({1, 0.9f, 0.8f, 0.7f}), (Seeds{0, 2})) << "distinct ones";
+}
+
+TEST(CandidatesFromModes, KeepPoseAndSeedAndCountTheMatches) {
+  Exec exec(1);
+  RegistrationOptions options;
+  options.compatibility.consensus_distance = 0.1f;
+  MatchSet matches;
+  for (int k = 0; k < 3; ++k) {
+    matches.source.push_back(0);
+    matches.target.push_back(0);
+    for (auto* column : {&matches.px, &matches.py, &matches.pz, &matches.qy, &matches.qz})
+      column->push_back(0);
+    matches.qx.push_back(static_cast<float>(k));  // moved by 0, 1 and 2 metres along x
+    matches.source_weight.push_back(10u + static_cast<std::uint32_t>(k));
+    matches.target_weight.push_back(20u);
+  }
+  const auto all =
+      candidates_from_modes(exec, {matches}, {{mode_at(0, 2, 7), mode_at(0, 5, 8)}}, options);
+  ASSERT_EQ(all[0].pose.size(), 2u);
+  EXPECT_EQ(all[0].seed, (std::vector<std::uint32_t>{7, 8}));
+  EXPECT_EQ(all[0].pose[0].tx, 2);
+  EXPECT_EQ(all[0].matches[0].inliers, 1u);
+  EXPECT_EQ(all[0].matches[0].source_weight, 12u);
+  EXPECT_EQ(all[0].matches[1].inliers, 0u);
 }
 
 TEST(DropReturned, NearTheOriginOrAnEarlierPose) {

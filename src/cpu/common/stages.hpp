@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "algorithm/mode_selection.hpp"
 #include "confidence/degeneracy_search.hpp"
 #include "cpu/common/exec.hpp"
 #include "cpu/common/stage_data.hpp"
@@ -88,11 +89,15 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<
                       std::vector<Candidates>& candidates, const RegistrationOptions& options);
 /// Distinct poses with the highest coarse_score.
 std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
-                                            const RegistrationOptions& options);
+                                            const ModeSelection& selection);
+/// Modes as candidates, with the matches that they align: to score and select them again.
+std::vector<Candidates> candidates_from_modes(Exec& exec, const std::vector<MatchSet>& matches,
+                                              const std::vector<std::vector<Mode>>& modes,
+                                              const RegistrationOptions& options);
 /// The first refinement: on a sample, with the wide kernel.
 void refine_roughly(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
                     const RegistrationOptions& options);
-/// The second refinement: on all points, with a narrower kernel.
+/// The second refinement: with a narrower kernel, on a sample and then on all points.
 void polish_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
                   const RegistrationOptions& options);
 /// Merges modes that refinement moved to the same pose, within a share of the limits of a mode;

@@ -30,9 +30,10 @@ IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& 
 }
 
 /// Iterates until it settles, at most max_iterations times.
-void refine_mode(MovedPoints& moved, const PairView& pair, const RegistrationOptions& options,
-                 float kernel_width, double settled, float min_cosine, Mode& mode) {
-  for (std::uint32_t k = 0; k < options.refine.max_iterations; ++k) {
+void refine_mode(MovedPoints& moved, const PairView& pair, std::uint32_t max_iterations,
+                 const RegistrationOptions& options, float kernel_width, double settled,
+                 float min_cosine, Mode& mode) {
+  for (std::uint32_t k = 0; k < max_iterations; ++k) {
     const IcpStep step =
         solve_icp(mode_sums(moved, pair, mode.pose, options, kernel_width, min_cosine),
                   pair.source.radius, options.prepare.max_correspondence_distance);
@@ -47,8 +48,8 @@ void refine_mode(MovedPoints& moved, const PairView& pair, const RegistrationOpt
 /// One refinement of all modes. order_of(p): the points of pair p that take part.
 template <typename OrderOf>
 void refine_each(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                 const RegistrationOptions& options, float kernel_width, double settled,
-                 const OrderOf& order_of) {
+                 std::uint32_t max_iterations, const RegistrationOptions& options,
+                 float kernel_width, double settled, const OrderOf& order_of) {
   const float min_cosine =
       inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine;
   const SummaryLimits limits(kRefineNormalAngle, false);
@@ -56,16 +57,29 @@ void refine_each(Exec& exec, Span<const PairView> pairs, std::vector<std::vector
       pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1,
       [&](std::size_t p, std::size_t k, std::size_t) {
         MovedPoints moved(order_of(p), pairs[p].target, limits);
-        refine_mode(moved, pairs[p], options, kernel_width, settled, min_cosine, modes[p][k]);
+        refine_mode(moved, pairs[p], max_iterations, options, kernel_width, settled, min_cosine,
+                    modes[p][k]);
       });
+}
+
+/// On a sample of each source.
+void refine_sample(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
+                   std::uint32_t max_iterations, const RegistrationOptions& options,
+                   float kernel_width, double settled) {
+  std::vector<ScoringOrder> sample(pairs.size);
+  exec.parallel(pairs.size, [&](std::size_t p) {
+    sample[p] =
+        sampled_order(executor_data(pairs[p].source),
+                      sample_stride(pairs[p].source.size, refinement_sample(options.evidence)));
+  });
+  refine_each(exec, pairs, modes, max_iterations, options, kernel_width, settled,
+              [&](std::size_t p) -> const ScoringOrder& { return sample[p]; });
 }
 
 }  // namespace
 
 std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
-                                            const RegistrationOptions& options) {
-  const ModeLimits within =
-      mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, 1.0f);
+                                            const ModeSelection& selection) {
   std::vector<std::vector<Mode>> out(candidates.size());
   exec.parallel(candidates.size(), [&](std::size_t p) {
     const Candidates& c = candidates[p];
@@ -75,12 +89,16 @@ std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candid
       return c.coarse_score[a] > c.coarse_score[b];
     });
     std::vector<Rigid> taken;
+    float least = 0.0f;
     for (const std::uint32_t k : order) {
-      if (taken.size() == options.evidence.modes) break;
+      if (taken.size() == selection.most) break;
+      if (taken.size() >= selection.certain && c.coarse_score[k] < least) break;
       const Rigid rigid = to_rigid(c.pose[k]);
-      if (std::any_of(taken.begin(), taken.end(),
-                      [&](const Rigid& other) { return same_mode(rigid, other, within); }))
+      if (std::any_of(taken.begin(), taken.end(), [&](const Rigid& other) {
+            return same_mode(rigid, other, selection.within);
+          }))
         continue;
+      if (taken.empty()) least = least_score(selection, c.coarse_score[k]);
       taken.push_back(rigid);
       out[p].push_back({widen(c.pose[k]), c.seed[k], 0});
     }
@@ -88,22 +106,38 @@ std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candid
   return out;
 }
 
+std::vector<Candidates> candidates_from_modes(Exec& exec, const std::vector<MatchSet>& matches,
+                                              const std::vector<std::vector<Mode>>& modes,
+                                              const RegistrationOptions& options) {
+  const float squared_distance =
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance;
+  std::vector<Candidates> out(modes.size());
+  exec.parallel(modes.size(), [&](std::size_t p) {
+    for (const Mode& mode : modes[p]) {
+      const Pose<float> pose = narrow(mode.pose);
+      out[p].pose.push_back(pose);
+      out[p].seed.push_back(mode.seed);
+      out[p].matches.push_back(count_matches(matches[p], to_rigid(pose), squared_distance));
+    }
+  });
+  return out;
+}
+
 void refine_roughly(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
                     const RegistrationOptions& options) {
-  std::vector<ScoringOrder> sample(pairs.size);
-  exec.parallel(pairs.size, [&](std::size_t p) {
-    sample[p] = sampled_order(executor_data(pairs[p].source),
-                              sample_stride(pairs[p].source.size, 2 * options.evidence.sample));
-  });
-  refine_each(exec, pairs, modes, options, options.refine.kernel_width, kRoughSettled,
-              [&](std::size_t p) -> const ScoringOrder& { return sample[p]; });
+  refine_sample(exec, pairs, modes, std::min(kRoughIterations, options.refine.max_iterations),
+                options, options.refine.kernel_width, kRoughSettled);
 }
 
 void polish_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
                   const RegistrationOptions& options) {
-  refine_each(
-      exec, pairs, modes, options, kPolishKernel * options.refine.kernel_width, kPolishSettled,
-      [&](std::size_t p) -> const ScoringOrder& { return executor_data(pairs[p].source).order; });
+  const float kernel_width = kPolishKernel * options.refine.kernel_width;
+  refine_sample(exec, pairs, modes, options.refine.max_iterations, options, kernel_width,
+                kPolishSettled);
+  refine_each(exec, pairs, modes, std::min(kFinalIterations, options.refine.max_iterations),
+              options, kernel_width, kPolishSettled, [&](std::size_t p) -> const ScoringOrder& {
+                return executor_data(pairs[p].source).order;
+              });
 }
 
 void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
