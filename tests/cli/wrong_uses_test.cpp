@@ -117,6 +117,9 @@ class WrongUses : public testing::TestWithParam<Use> {
       cameras += std::to_string(k) + " 0 512.5 -81 30 0 0 0 1\n";
     }
     folder_->write("scans/cameras.txt", cameras);
+    std::filesystem::create_directory(*folder_ / "small");
+    for (const char* name : {"small/first.ply", "small/second.ply"})
+      write_cloud(*folder_, name, scaled(a, 0.1f));
   }
   static void TearDownTestSuite() {
     delete folder_;
@@ -164,6 +167,10 @@ INSTANTIATE_TEST_SUITE_P(
             align("millimetres.ply", "millimetres.ply", {"--backend", "cpu"}),
             1,
             {"note: the default of --voxel-size, 0.05, may not suit these clouds: auto would be "}},
+        Use{"ASetAndTheDefault",
+            {"batch", "small", "-o", "/dev/null", "--backend", "cpu"},
+            0,
+            {"note: the default of --voxel-size, 0.05, leaves ", "--voxel-size auto"}},
         Use{"Centimetres",
             align("centimetres.ply", "a.ply", {"--voxel-size", "0.5", "--backend", "cpu"}),
             1,

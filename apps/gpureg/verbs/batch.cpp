@@ -79,6 +79,8 @@ class Batch {
     }
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
     if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
+    if (!o_.method.given("--voxel-size") && !o_.quiet)
+      note_unusual_points(o_.method.voxel_size, scene_.prepared_sizes());
     const Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.input.path + " holds one scan, " + scene_.scans[0].name +

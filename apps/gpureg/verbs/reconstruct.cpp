@@ -152,6 +152,8 @@ class Reconstruct {
     run_.seconds.prepare = scene.seconds;
     check_voxel_size(run_.options.prepare.voxel_size, scene.extent, "the largest fragment");
     if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene.prepared_sizes());
+    if (!o_.method.given("--voxel-size") && !o_.quiet)
+      note_unusual_points(o_.method.voxel_size, scene.prepared_sizes());
     // A bad file shall show before hours of work.
     if (!o_.odometry.empty()) odometry_ = known_poses();
     const Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
