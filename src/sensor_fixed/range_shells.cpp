@@ -187,57 +187,66 @@ struct RangeExtent {
 class RangeSample {
  public:
   RangeSample(const RawCloud& raw, const Viewed& viewed) {
-    const std::size_t step = std::max<std::size_t>(1, raw.size / kSampledRows);
-    rays_.reserve(raw.size / step);
-    float farthest = 0;
-    for (std::size_t k = 0; k < raw.size / step; ++k) {
-      const Vec3 to = viewed.ray(k * step + k * kJitter % step);
+    const std::size_t step = std::max<std::size_t>(1, raw.size / kSampledRows),
+                      further = kJitter % step;
+    std::size_t within = 0;  // the step
+    for (std::size_t row = 0; row + step <= raw.size; row += step) {
+      const Vec3 to = viewed.ray(row + within);
+      within += further;
+      if (within >= step) within -= step;
       const float squared = squared_norm(to);
       if (!(squared <= std::numeric_limits<float>::max())) continue;
-      rays_.push_back({static_cast<double>(squared), to});
-      farthest = squared > farthest ? squared : farthest;
+      to_[size_] = to;
+      squared_[size_++] = squared;
+      farthest_ = squared > farthest_ ? squared : farthest_;
     }
-    at_sensor_ = kAtSensor * farthest;
-    for (const SeenRay& ray : rays_) extent_.add(ray.to, static_cast<float>(ray.range), at_sensor_);
+    at_sensor_ = kAtSensor * farthest_;
+    for (std::size_t k = 0; k < size_; ++k) {
+      some_at_sensor_ |= squared_[k] <= at_sensor_;
+      const float seen = squared_[k] > at_sensor_ ? squared_[k] : nearest_;
+      nearest_ = seen < nearest_ ? seen : nearest_;
+    }
   }
 
   float at_sensor() const { return at_sensor_; }
-  bool some_at_sensor() const { return extent_.at_sensor > 0; }
-  bool suspects_far() const { return suspects(kFar, extent_.far_range()); }
+  bool some_at_sensor() const { return some_at_sensor_; }
+  bool suspects_far() const { return suspects(kFar, farthest_); }
   bool suspects_near() const {
-    return suspects(kNear, extent_.near_range()) &&
-           extent_.near_range() <= 2 * kNearShare * median();
+    return suspects(kNear, nearest_) &&
+           std::sqrt(static_cast<double>(nearest_)) <= 2 * kNearShare * median();
   }
   double median() const {
-    std::vector<double> squares;
-    for (const SeenRay& ray : rays_)
-      if (static_cast<float>(ray.range) > at_sensor_) squares.push_back(ray.range);
+    std::vector<float> squares;
+    for (std::size_t k = 0; k < size_; ++k)
+      if (squared_[k] > at_sensor_) squares.push_back(squared_[k]);
     if (squares.empty()) return 0;
     const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
     std::nth_element(squares.begin(), middle, squares.end());
-    return std::sqrt(*middle);
+    return std::sqrt(static_cast<double>(*middle));
   }
   /// Of a 2-D scanner: all directions are in one plane.
   bool planar() const {
     std::vector<SeenRay> seen;
-    for (const SeenRay& ray : rays_)
-      if (static_cast<float>(ray.range) > at_sensor_)
-        seen.push_back({std::sqrt(ray.range), ray.to});
+    for (std::size_t k = 0; k < size_; ++k)
+      if (squared_[k] > at_sensor_)
+        seen.push_back({std::sqrt(static_cast<double>(squared_[k])), to_[k]});
     return !seen.empty() && Directions(seen, seen.size()).solidity() < kLeastSolidity;
   }
 
  private:
-  bool suspects(const End& end, double last) const {
-    Shell shell(end, last);
-    for (const SeenRay& ray : rays_)
-      if (static_cast<float>(ray.range) > at_sensor_)
-        shell.offer(ray.to, static_cast<float>(ray.range));
+  bool suspects(const End& end, float squared_last) const {
+    Shell shell(end, std::sqrt(static_cast<double>(squared_last)));
+    for (std::size_t k = 0; k < size_; ++k)
+      if (squared_[k] > at_sensor_) shell.offer(to_[k], squared_[k]);
     return shell.find(kMoreInSample, kLeastInSample);
   }
 
-  std::vector<SeenRay> rays_;  // with squared ranges
-  float at_sensor_ = 0;
-  RangeExtent extent_;
+  // A step is at least a sampled share of the rows, so there are fewer than twice as many.
+  Vec3 to_[2 * kSampledRows];
+  float squared_[2 * kSampledRows];
+  std::size_t size_ = 0;
+  float farthest_ = 0, nearest_ = std::numeric_limits<float>::infinity(), at_sensor_ = 0;
+  bool some_at_sensor_ = false;
 };
 
 }  // namespace
