@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <random>
 
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
@@ -50,6 +51,24 @@ TEST_F(Batch, LogAndInformationOfTheAlignedPairs) {
     EXPECT_LT(rotation_error_degrees(truth, Eigen::Isometry3d(log[k].transform)), 1);
   }
   EXPECT_EQ(out_.count(), 3u) << "the journal must be gone";
+}
+
+TEST_F(Batch, WhatIsFixedToTheSensorIsLeftOutAndNamed) {
+  const TemporaryFolder scans;
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal;
+  for (int k = 0; k < kScans; ++k) {
+    PointCloud scan = room_scan(k);
+    for (std::size_t n = scan.points.size() / 5; n > 0; --n)
+      scan.points.push_back(
+          Eigen::Vector3f(0.3f, 0.05f, 0.1f) +
+          0.05f * Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
+    write_cloud(scans, "cloud_bin_" + std::to_string(k) + ".ply", scan);
+  }
+  const Outcome outcome = run(joined({"batch", scans.path(), "-o", out_ / "r.log"}, kSmall));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"aligned    6, written to"});
+  expect_holds(outcome.err, {"left out as fixed to the sensor", "and some of 3 more scans"});
 }
 
 TEST_F(Batch, VoxelSizeByTheFragments) {

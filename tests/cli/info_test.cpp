@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <random>
 
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
@@ -42,6 +43,27 @@ TEST(Info, SuggestionLeavesAboutFiveThousandPoints) {
   ASSERT_NE(at, std::string::npos) << outcome.out;
   const double voxel = std::stod(outcome.out.substr(at + 13));
   EXPECT_NEAR(16 / (voxel * voxel), 5000, 1500) << "voxels of " << voxel << " m";
+}
+
+TEST(Info, NamesWhatIsFixedToTheSensor) {
+  const TemporaryFolder folder;
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal;
+  std::vector<std::string> words = {"info"};
+  for (int k = 0; k < 4; ++k) {
+    PointCloud scan = room_scan(k);
+    const std::size_t size = scan.points.size();
+    for (std::size_t n = 0; n < size / 20; ++n) {
+      const Eigen::Vector3f any(normal(random), normal(random), normal(random));
+      scan.points.emplace_back(Eigen::Vector3f(0.3f, 0.05f, 0.1f) + 0.05f * any.normalized());
+      if (n % 4 == 0) scan.points.emplace_back(20 * any.normalized());
+    }
+    words.push_back(write_cloud(folder, "scan" + std::to_string(k) + ".ply", scan));
+  }
+  const Outcome outcome = run(words);
+  EXPECT_EQ(outcome.status, 0);
+  expect_holds(outcome.out, {"points at the largest range of 20 (left out)", "fixed to sensor  ",
+                             "at the same place in most of these scans"});
 }
 
 TEST(Info, CloudsOfNothing) {
