@@ -16,7 +16,8 @@ constexpr std::size_t kRowJitter = 7919;
 constexpr std::size_t kLeastScans = 3;
 /// Cells in median ranges: 9 cm in rooms, 40 cm in streets. Neighbours of one surface are in
 /// neighbouring cells.
-constexpr float kCellRanges = 1.0f / 25;
+/// Sparse parts have none; for them the cells are twice as wide.
+constexpr float kCellRanges[] = {1.0f / 25, 1.0f / 12};
 /// A cell is constant where so many of the scans have a point in it.
 constexpr double kConstant = 0.8;
 /// A part is a connected component of cells of which hardly any is not constant ...
@@ -24,10 +25,10 @@ constexpr double kPart = 0.9;
 /// ... with this share of the points or more.
 constexpr std::size_t kLeastPart = 500, kLeastRows = 8;
 /// Scans whose far half is constant to this share were taken from one place (0.54 to 0.64 of scans
-/// with other noise; 0.34 of three along a corridor, 0.21 of walks): in cells so many times
-/// wider, of which a sample misses few.
+/// with other noise; 0.34 of three along a corridor, 0.21 of walks): in cells of so many median
+/// ranges, of which a sample misses few.
 constexpr double kMoved = 0.45;
-constexpr float kWideCells = 3;
+constexpr float kGuardRanges = 3.0f / 25;
 
 using PartCell = FixedParts::Cell;
 
@@ -103,6 +104,7 @@ struct SampledScan {
     median = middle_of(std::move(ranges));
   }
   void sort_into(float cell) {
+    rows.clear();
     for (const Eigen::Vector3f& p : points)
       if (in_reach(p, cell)) ++rows[cell_of(p, cell)];
   }
@@ -120,7 +122,6 @@ class ConstantCells {
       if (static_cast<double>(count) >= least)
         around(at, [&](const PartCell& c) { cells_.insert(c); });
   }
-  bool none() const { return cells_.empty(); }
   /// Calls action for the cells of parts that are isolated from everything that is not constant.
   template <typename Action>
   void for_parts(const SampledScan& scan, const Action& action) const {
@@ -174,6 +175,21 @@ double constant_share(const std::vector<SampledScan>& scans, float cell) {
   return static_cast<double>(constant) / static_cast<double>(std::max<std::size_t>(1, far));
 }
 
+/// Parts in cells of an edge.
+FixedParts parts_in(std::vector<SampledScan>& scans, float cell) {
+  FixedParts out;
+  out.cell = cell;
+  for (SampledScan& scan : scans) scan.sort_into(cell);
+  const ConstantCells constant(scans, cell);
+  Counts votes;
+  for (const SampledScan& scan : scans)
+    constant.for_parts(scan, [&](const PartCell& at) { ++votes[at]; });
+  for (const auto& [at, count] : votes)
+    if (2 * count >= scans.size()) out.cells.push_back(at);
+  std::sort(out.cells.begin(), out.cells.end());
+  return out;
+}
+
 }  // namespace
 
 FixedParts find_fixed_parts(const std::vector<PointCloudView>& clouds) {
@@ -182,8 +198,7 @@ FixedParts find_fixed_parts(const std::vector<PointCloudView>& clouds) {
     view.validate();
     if (view.size > 0 && has_sensor_frame(view)) known.push_back(&view);
   }
-  FixedParts out;
-  if (known.size() < kLeastScans) return out;
+  if (known.size() < kLeastScans) return {};
   std::vector<SampledScan> scans;
   std::vector<float> ranges;
   const std::size_t chosen = std::min(kScans, known.size());
@@ -191,19 +206,11 @@ FixedParts find_fixed_parts(const std::vector<PointCloudView>& clouds) {
     scans.emplace_back(*known[k * known.size() / chosen]);
     ranges.push_back(scans.back().median);
   }
-  out.cell = kCellRanges * middle_of(std::move(ranges));
-  if (!(out.cell > 0)) return {};
-  for (SampledScan& scan : scans) scan.sort_into(out.cell);
-  const ConstantCells constant(scans, out.cell);
-  if (constant.none()) return out;
-  if (constant_share(scans, kWideCells * out.cell) >= kMoved) return out;
-  Counts votes;
-  for (const SampledScan& scan : scans)
-    constant.for_parts(scan, [&](const PartCell& at) { ++votes[at]; });
-  for (const auto& [at, count] : votes)
-    if (2 * count >= scans.size()) out.cells.push_back(at);
-  std::sort(out.cells.begin(), out.cells.end());
-  return out;
+  const float range = middle_of(std::move(ranges));
+  if (!(range > 0) || constant_share(scans, kGuardRanges * range) >= kMoved) return {};
+  for (const float share : kCellRanges)
+    if (FixedParts parts = parts_in(scans, share * range); !parts.cells.empty()) return parts;
+  return {};
 }
 
 std::vector<std::uint32_t> rows_in(const FixedParts& parts, const PointCloudView& cloud) {
