@@ -23,7 +23,7 @@ struct EvidenceScene {
     seeds = cpu::choose_seeds(exec, matches, options);
     candidates = cpu::propose_poses(exec, matches, seeds, options);
     cpu::score_candidates(exec, {&pair, 1}, matches, candidates, options);
-    modes = cpu::select_modes(exec, candidates, options);
+    modes = cpu::select_modes(exec, candidates, first_selection(options.evidence));
   }
   static EvidenceScene& get() {
     static EvidenceScene scene;
