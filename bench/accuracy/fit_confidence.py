@@ -9,17 +9,19 @@ gt_all. Each run is tested with a fit on the other buildings. A fit on all of th
 coefficients of the library. Names and values of the features come from the library: this script
 computes none.
 
-Three logistic regressions. The first ranks the modes of a pair by their own evidence. The second
-gives the probability that the best mode is correct. It also sees its margin over the other modes
-and how many there are. No mode gets more than its share of the odds of all, as at most one is
-correct. The third gives the probability that the pose is correct and the clouds overlap by 30 % or
-more (in gt.log), which Redwood's strict rule asks for. Each exists four times: with and without
-free space, with and without the sides of surfaces.
+Three regressions. The first ranks the modes of a pair by their own evidence: of distinct poses at most
+one is correct, so it is a conditional logit over the modes of the pairs that have a correct one. The
+second gives the probability that the best mode is correct. It also sees the other modes. No mode gets
+more than its share of the odds of all. The third gives the probability that the pose is correct and the
+clouds overlap by 30 % or more (in gt.log), which Redwood's strict rule asks for. The second and third
+are additive, piecewise linear and monotone in each feature (SIGNS): more overlap never hurts, more
+violation never helps, and beyond the values of the fit nothing gets more certain. Each exists four
+times: with and without free space, with and without the sides of surfaces. Scans on models and 2-D
+scans have logistic regressions that are linear in their features.
 
-Buildings are few, and one kind of sensor observed them. So the second regression also learns from
-the runs of --beside: the same scenes by other sensors (other_sensor.py) or with other voxels, and
-generated buildings (`gpureg generate`), which are full of perceptual aliases. They are left out
-with their building, too, and take no part in the ranking.
+Kinds of buildings differ in how often places repeat, and no evidence of one pair tells a copy of a
+place from the place. So all kinds take part, bare ones and those full of equal furniture, too: each
+run counts as much as its kind has runs. --beside: runs of other sensors (other_sensor.py) and voxels.
 
 Nothing moves in these scenes. So that a moved chair does not cost a pose its confidence, every pair
 is fitted a second time, with little weight, as if up to a tenth of one of its clouds were new.
@@ -33,6 +35,7 @@ false positives. Needs numpy, scikit-learn, the Python package gpureg, and clang
 --header."""
 
 import argparse
+import collections
 import itertools
 import json
 import multiprocessing
@@ -55,6 +58,11 @@ class Model(NamedTuple):
     free_space: bool
     surface_sides: bool
     model: bool = False  # one of the clouds is a closed surface
+    flat: bool = False  # scans of 2-D scanners
+
+    @property
+    def additive(self):
+        return not self.model and not self.flat and not self.overlap_alone
 
     @property
     def overlap_alone(self):
@@ -69,7 +77,10 @@ MODELS = {
     "model": Model(False, True, True),
 }
 # Of 2-D scans, which have the same features; see bench/flat_scans.
-FLAT_MODELS = {"flat": Model(True, True), "flat_surface_sides": Model(False, True)}
+FLAT_MODELS = {
+    "flat": Model(True, True, False, True),
+    "flat_surface_sides": Model(False, True, False, True),
+}
 ALL_MODELS = {**MODELS, **FLAT_MODELS}
 REGRESSIONS = ("ranking", "confidence", "overlap")
 
@@ -79,8 +90,64 @@ MIN_SEPARATION = 2  # j - i: neighbours in the sequence do not count in Redwood'
 # Inverse strengths of the L2 penalty. Chosen among 38 settings by the tables of docs/accuracy.md
 # and by a correct pose in a changed place.
 STRENGTHS = {"ranking": 0.15, "confidence": 0.00025, "overlap": 1.0}
+# Of the additive regressions: the direction in which each feature may move the odds. Others are left
+# out: what has no direction belongs to a sensor or a building.
+SIGNS = {
+    **dict.fromkeys(
+        (
+            "log_match_support",
+            "log_match_inliers",
+            "log_lower_weighted_overlap",
+            "log_lower_overlap",
+            "log_first_eigenvalue",
+            "log_second_eigenvalue",
+            "log_third_eigenvalue",
+            "information_volume",
+            "lower_normal_agreement",
+            "higher_normal_agreement",
+            "share",
+            "match_inliers_lead",
+            "match_support_lead",
+            "weighted_overlap_lead",
+        ),
+        1,
+    ),
+    **dict.fromkeys(
+        (
+            "higher_violation_of_all",
+            "lower_violation_of_all",
+            "higher_violation",
+            "lower_violation",
+            "log_higher_violation",
+            "log_violation_of_all",
+            "log_front_violation_near",
+            "log_front_violation_far",
+            "log_behind_surface",
+            "higher_front_share",
+            "lower_front_share",
+            "higher_behind_share",
+            "lower_behind_share",
+            "distinct_share",
+            "rival_match_inliers",
+            "third_match_inliers",
+            "rival_match_support",
+            "rival_weighted_overlap",
+        ),
+        -1,
+    ),
+}
+KNOTS = 5  # of a feature: quantiles from END to 1 - END
+END = 0.005
+STEP_PENALTY = 3.0  # half of it times the square of each rise; pairs count one on average
+RANK_PENALTY = 3.0  # the same of the weights of standardised features in the ranking
+MIN_RISE = 5e-4  # of a step that the header keeps
+EASY = 0.7  # share of the pairs without a correct mode that are easy: those with the fewest matches ...
+EASY_KEPT = 0.25  # ... of which this share is fitted, and stands for the others
+LINEAR_RANK = ("log_odds", "margin", "distinct_share")  # the rank in regressions linear in it
+
 MODEL_STRENGTH = 1.0  # of the regressions for models, which have two features and the rank
 NO_PENALTY = 1e6  # for slope and intercept, which two numbers cannot overfit
+MAX_DESCENT = 200  # iterations of the additive regressions and of the ranking
 MAX_ITERATIONS = 5000  # of the solver, which warns where they are too few
 MIN_SCALE = 1e-9  # bounds the standard deviation of a constant feature
 
@@ -90,6 +157,7 @@ CHANGED_WEIGHT = 0.11  # of a changed pair beside the pair itself
 MAX_CHANGED = 0.1  # share of a cloud that is new
 CHANGED_NEAR = (0.3, 0.8)  # share of the new points in front of surfaces that is near
 CHANGED_SEED = 1
+EASY_SEED = 2
 
 PRECISIONS = (80, 95, 99)  # percent, at which recall is reported
 CALIBRATION_BINS = 10
@@ -219,7 +287,7 @@ class Run:
         return (self.free_space or not model.free_space) and self.model == model.model
 
     def features(self, model, regressand, modes=...):
-        return library()._confidence_features(rows(self.evidence, modes), *model, regressand)
+        return library()._confidence_features(rows(self.evidence, modes), *model[:3], regressand)
 
 
 class ChangedRun(Run):
@@ -264,13 +332,85 @@ def changed(evidence, side, share, near):
 
 
 class Regression:
-    """weights: one per feature of the library."""
+    """weights: one per feature of the library; steps: (feature, from, to, rise)."""
 
-    def __init__(self, weights, bias):
-        self.weights, self.bias = weights, bias
+    def __init__(self, weights, bias, steps=()):
+        self.weights, self.bias, self.steps = weights, bias, list(steps)
 
     def log_odds(self, x):
-        return x @ self.weights + self.bias
+        out = x @ self.weights + self.bias
+        for feature, start, end, rise in self.steps:
+            out = out + rise * np.clip((x[:, feature] - start) / (end - start), 0, 1)
+        return out
+
+
+def minimised(objective, start, bounds=None):
+    """objective: value and gradient."""
+    from scipy.optimize import minimize  # only fits need it
+
+    return minimize(
+        objective,
+        start,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"maxiter": MAX_DESCENT, "maxfun": 2 * MAX_DESCENT},
+    ).x
+
+
+def conditional_logit(x, correct, modes_per_pair, weight):
+    """Weights under which the correct modes of each pair get their share of the odds of all its
+    modes. Every pair has a correct one. weight: of each pair.
+    """
+    used = np.flatnonzero(x.std(0) > MIN_SCALE)
+    scale = x[:, used].std(0)
+    z = (x[:, used] - x[:, used].mean(0)) / scale
+    first = np.r_[0, np.cumsum(modes_per_pair)[:-1]]
+    pair = np.repeat(np.arange(len(first)), modes_per_pair)
+    weight = weight / weight.mean()
+
+    def objective(w):
+        odds = z @ w
+        odds = np.exp(odds - np.maximum.reduceat(odds, first)[pair])
+        of_all = np.add.reduceat(odds, first)
+        of_correct = np.maximum(np.add.reduceat(odds * correct, first), np.finfo(float).tiny)
+        share = odds / of_all[pair] - odds * correct / of_correct[pair]
+        value = -(weight * np.log(of_correct / of_all)).sum() + RANK_PENALTY / 2 * w @ w
+        return value, z.T @ (weight[pair] * share) + RANK_PENALTY * w
+
+    weights = np.zeros(x.shape[1])
+    weights[used] = minimised(objective, np.zeros(len(used))) / scale
+    return Regression(weights, 0.0)
+
+
+def monotone(x, y, weight):
+    """The additive regression; see SIGNS."""
+    weight = weight / weight.mean()
+    names = library()._confidence_feature_names()
+    steps, columns, bounds = [], [], [(None, None)]
+    for feature, name in enumerate(names):
+        knots = np.unique(np.quantile(x[:, feature], np.linspace(END, 1 - END, KNOTS)))
+        if name not in SIGNS or not np.ptp(knots) > MIN_SCALE:
+            continue
+        for start, end in itertools.pairwise(knots):
+            if end - start > MIN_SCALE:
+                steps.append((feature, start, end))
+                columns.append(np.clip((x[:, feature] - start) / (end - start), 0, 1))
+                bounds.append((0, None) if SIGNS[name] > 0 else (None, 0))
+    ramps = np.stack(columns, 1)
+
+    def objective(p):
+        odds = ramps @ p[1:] + p[0]
+        value = (weight * (np.logaddexp(0, odds) - y * odds)).sum()
+        error = weight * (1 / (1 + np.exp(-odds)) - y)
+        gradient = np.r_[error.sum(), ramps.T @ error + STEP_PENALTY * p[1:]]
+        return value + STEP_PENALTY / 2 * p[1:] @ p[1:], gradient
+
+    start = np.zeros(len(bounds))
+    start[0] = np.log((weight * y).sum() / (weight * ~y).sum())
+    bias, *rises = minimised(objective, start, bounds)
+    kept = [(*step, rise) for step, rise in zip(steps, rises) if abs(rise) > MIN_RISE]
+    return Regression(np.zeros(x.shape[1]), float(bias), kept)
 
 
 def logistic(x, y, weight, strength):
@@ -301,18 +441,65 @@ def best_modes(run, model, ranking):
     which mode it is; its share of the odds of all.
     """
     log_odds = ranking.log_odds(run.features(model, "ranking"))
-    rank = library()._confidence_rank_features(log_odds, run.modes_per_pair, run.refined)
+    own = run.features(model, "confidence")
+    rank = library()._confidence_rank_features(log_odds, own, run.modes_per_pair, run.refined)
+    if not model.additive:
+        names = library()._confidence_feature_names()
+        rank = rank * np.isin(names, LINEAR_RANK)
     best, share = [], []
     for modes in np.split(np.arange(len(log_odds)), np.cumsum(run.modes_per_pair)[:-1]):
         if len(modes):
             best.append(modes[log_odds[modes].argmax()])
             share.append(1 / np.exp(log_odds[modes] - log_odds[best[-1]]).sum())
     best = np.array(best)
-    return run.features(model, "confidence", best) + rank[best], best, np.array(share)
+    return own[best] + rank[best], best, np.array(share)
+
+
+def fit_additive(runs, model):
+    """The three regressions by name."""
+    count = collections.Counter(run.building for run in runs)
+    runs = [*runs, *map(ChangedRun, runs)]
+    weight_of = [run.weight / count[run.building] for run in runs]
+    x, correct, modes, weight = [], [], [], []
+    for run, of_run in zip(runs, weight_of):
+        known = np.bincount(run.pair[run.correct], minlength=len(run.keys)) > 0
+        x.append(run.features(model, "ranking", known[run.pair]))
+        correct.append(run.correct[known[run.pair]])
+        modes.append(run.modes_per_pair[known])
+        weight.append(np.full(known.sum(), of_run))
+    ranking = conditional_logit(*map(np.concatenate, (x, correct, modes, weight)))
+
+    random = np.random.default_rng(EASY_SEED)
+    column = library()._confidence_feature_names().index("log_match_inliers")
+    x, weight, labels = [], [], {"correct": [], "strict": []}
+    for run, of_run in zip(runs, weight_of):
+        features, best, _ = best_modes(run, model, ranking)
+        known = np.bincount(run.pair[run.correct], minlength=len(run.keys)) > 0
+        hopeless = ~known[run.pair[best]]
+        matches = features[:, column]
+        easy = (
+            hopeless & (matches < np.quantile(matches[hopeless], EASY))
+            if hopeless.any()
+            else hopeless
+        )
+        kept = ~easy | (random.random(len(best)) < EASY_KEPT)
+        x.append(features[kept])
+        of_pair = of_run / len(best)
+        weight.append(np.where(easy[kept], of_pair / EASY_KEPT, of_pair))
+        for label, of in labels.items():
+            of.append(getattr(run, label)[best[kept]])
+    x, weight = np.concatenate(x), np.concatenate(weight)
+    return {
+        "ranking": ranking,
+        "confidence": monotone(x, np.concatenate(labels["correct"]), weight),
+        "overlap": monotone(x, np.concatenate(labels["strict"]), weight),
+    }
 
 
 def fit(runs, beside, model):
-    """The three regressions by name; the second also from the runs beside."""
+    """The three regressions by name; linear ones use the runs beside for the second alone."""
+    if model.additive:
+        return fit_additive([*runs, *beside], model)
     if not model.model:
         runs, beside = ([*of, *map(ChangedRun, of)] for of in (runs, beside))
     strengths = dict.fromkeys(STRENGTHS, MODEL_STRENGTH) if model.model else STRENGTHS
@@ -421,11 +608,17 @@ def constant(name):
     return "k" + "".join(word.capitalize() for word in name.split("_"))
 
 
+def steps_of(name, stage):
+    return f"{constant(name)}{stage.capitalize()}Steps"
+
+
 def header(models):
     """C++ of the models by name, each a dictionary of regressions; not yet formatted."""
     names = library()._confidence_feature_names()
 
-    def regression(of):
+    def regression(of, constant):
+        if of.steps:
+            return f"additive({of.bias:.9g}, {constant})"
         weights = ", ".join(
             f"{{Feature::{name}, {weight:.9g}}}"
             for name, weight in zip(names, of.weights)
@@ -444,7 +637,14 @@ def header(models):
         "",
     ]
     for name, of in models.items():
-        three = ", ".join(regression(of[stage]) for stage in REGRESSIONS)
+        for stage in REGRESSIONS:
+            if of[stage].steps:
+                listed = ", ".join(
+                    f"{{Feature::{names[k]}, {start:.9g}, {end:.9g}, {rise:.9g}}}"
+                    for k, start, end, rise in of[stage].steps
+                )
+                lines += [f"constexpr Step {steps_of(name, stage)}[] = {{{listed}}};", ""]
+        three = ", ".join(regression(of[stage], steps_of(name, stage)) for stage in REGRESSIONS)
         lines += [f"constexpr ConfidenceModel {constant(name)}{{{three}}};", ""]
     return "\n".join([*lines, "}  // namespace gpureg::confidence", ""])
 
@@ -457,14 +657,23 @@ def read_header(text):
         body = re.search(rf"ConfidenceModel {constant(name)}\{{(.*?)\}};", text, re.DOTALL)
         if body is None:
             raise ValueError(f"the header has no {constant(name)}")
-        found = re.findall(r"weights\(\{(.*?)\}\),\s*([^}\s]+)\s*\}", body[1] + "}", re.DOTALL)
+        found = re.findall(
+            r"additive\(([^,]+),\s*(\w+)\)|weights\(\{(.*?)\}\),\s*([^}\s]+)\s*\}",
+            body[1] + "}",
+            re.DOTALL,
+        )
         models[name] = {}
-        for stage, (weights, bias) in zip(REGRESSIONS, found, strict=True):
-            of = dict(re.findall(r"\{Feature::(\w+),\s*([^}\s]+)\s*\}", weights))
-            if unknown := of.keys() - set(names):
+        for stage, (bias, steps, weights, linear_bias) in zip(REGRESSIONS, found, strict=True):
+            of, listed = dict(re.findall(r"\{Feature::(\w+),\s*([^}\s]+)\s*\}", weights)), []
+            if steps:
+                table = re.search(rf"Step {steps}\[\] = \{{(.*?)\}};", text, re.DOTALL)[1]
+                listed = re.findall(r"\{Feature::(\w+),([^}]+)\}", table)
+            if unknown := (of.keys() | {feature for feature, _ in listed}) - set(names):
                 raise ValueError(f"the library has no feature {sorted(unknown)[0]}")
             models[name][stage] = Regression(
-                np.array([float(of.get(feature, 0)) for feature in names]), float(bias)
+                np.array([float(of.get(feature, 0)) for feature in names]),
+                float(bias or linear_bias),
+                [(names.index(f), *map(float, numbers.split(","))) for f, numbers in listed],
             )
     return models
 

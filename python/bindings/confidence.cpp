@@ -124,8 +124,11 @@ Numbers features(const py::dict& evidence, bool free_space, bool surface_sides, 
   return out;
 }
 
-Numbers rank_features(const std::vector<double>& log_odds,
+Numbers rank_features(const std::vector<double>& log_odds, const Numbers& own,
                       const std::vector<std::size_t>& modes_per_pair, std::uint32_t refined) {
+  if (own.ndim() != 2 || own.shape(0) != static_cast<py::ssize_t>(log_odds.size()) ||
+      own.shape(1) != static_cast<py::ssize_t>(confidence::kFeatureCount))
+    throw py::value_error("own: expected the features of each of log_odds");
   Numbers out = table(log_odds.size());
   std::size_t first = 0;
   for (const std::size_t count : modes_per_pair) {
@@ -133,9 +136,13 @@ Numbers rank_features(const std::vector<double>& log_odds,
       throw py::value_error("modes_per_pair: more modes than log_odds");
     const auto begin = log_odds.begin() + static_cast<std::ptrdiff_t>(first);
     const std::vector<double> of_pair(begin, begin + static_cast<std::ptrdiff_t>(count));
+    std::vector<confidence::Features> own_of_pair(count);
+    for (std::size_t k = 0; k < count; ++k)
+      std::copy_n(own.data(static_cast<py::ssize_t>(first + k), 0), confidence::kFeatureCount,
+                  own_of_pair[k].begin());
     for (std::size_t k = 0; k < count; ++k) {
       confidence::Features row{};
-      confidence::add_rank(of_pair, k, refined, row);
+      confidence::add_rank(of_pair, own_of_pair, k, refined, row);
       write(row, first + k, out);
     }
     first += count;
@@ -154,9 +161,10 @@ void bind_confidence(py::module_& m) {
         "model"_a, "regressand"_a,
         "(modes, features): of modes by their own evidence. evidence: the keys of a result's JSON, "
         "each an array with a row per mode.");
-  m.def("_confidence_rank_features", &rank_features, "log_odds"_a, "modes_per_pair"_a, "refined"_a,
-        "(modes, features): log_odds, margin and distinct_share of modes among the others of their "
-        "pair, 0 elsewhere. refined: options.evidence.modes.");
+  m.def("_confidence_rank_features", &rank_features, "log_odds"_a, "own"_a, "modes_per_pair"_a,
+        "refined"_a,
+        "(modes, features): of modes among the others of their pair, 0 elsewhere. own: from "
+        "_confidence_features. refined: options.evidence.modes.");
   m.def(
       "_confidence_factor", py::vectorize([](std::uint32_t points, std::uint32_t of) {
         return confidence::factor_of({points, of});

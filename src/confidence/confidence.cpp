@@ -77,10 +77,14 @@ std::vector<ModeConfidence> confidences_of(const std::vector<RankedMode>& modes,
   const ConfidenceModel& model = model_of(available);
   const std::vector<double> share = shares_of(modes);
   std::vector<double> log_odds;
-  for (const RankedMode& mode : modes) log_odds.push_back(mode.log_odds);
+  std::vector<Features> own;
+  for (const RankedMode& mode : modes) {
+    log_odds.push_back(mode.log_odds);
+    own.push_back(features_of(mode.evidence, available, Regressand::confidence));
+  }
   for (std::size_t k = 0; k < modes.size(); ++k) {
-    Features x = features_of(modes[k].evidence, available, Regressand::confidence);
-    add_rank(log_odds, k, refined, x);
+    Features x = own[k];
+    add_rank(log_odds, own, k, refined, x);
     ModeConfidence mode{portable::logistic(model.confidence.log_odds(x)),
                         portable::logistic(model.overlap.log_odds(x))};
     mode.confidence = std::min(mode.confidence, share[k]) * factor_of(modes[k].overlap);

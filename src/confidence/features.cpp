@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace gpureg::confidence {
 namespace {
@@ -22,6 +23,8 @@ constexpr double kMinVerifiedFrontViolation = 2e-2;
 constexpr double kMinDenominator = 1e-6;
 /// Bounds the log odds as features: beyond, modes are certain one way or the other.
 constexpr double kMaxLogOdds = 14;
+/// Bounds the odds of the share: no mode is ten thousand times as likely as all others together.
+constexpr double kMinOthers = 1e-4;
 
 double log_at_least(double value, double least) { return portable::log(std::max(value, least)); }
 
@@ -58,6 +61,7 @@ void add_overlap(const PoseEvidence& e, Setter& set) {
   set(Feature::log_lower_overlap, log_at_least(overlap.lower(), kMinOverlap));
   set(Feature::log_first_eigenvalue, log_at_least(e.information_eigenvalues[0], kMinEigenvalue));
   set(Feature::log_second_eigenvalue, log_at_least(e.information_eigenvalues[1], kMinEigenvalue));
+  set(Feature::log_third_eigenvalue, log_at_least(e.information_eigenvalues[2], kMinEigenvalue));
   set(Feature::information_volume, volume);
 }
 
@@ -94,7 +98,6 @@ void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regres
   set(Feature::higher_normal_agreement, normal_agreement.higher());
   set(Feature::higher_near_surface, near_surface.higher());
   set(Feature::lower_near_surface, near_surface.lower());
-  if (free_space) return;  // it tells the rest
   const Sides front_far{e.source_front_violation_far, e.target_front_violation_far};
   const Sides behind{e.source_behind_surface, e.target_behind_surface};
   const auto of_near = [&](const Sides& part) {
@@ -132,6 +135,7 @@ constexpr const char* kNames[] = {"log_match_support",
                                   "log_lower_overlap",
                                   "log_first_eigenvalue",
                                   "log_second_eigenvalue",
+                                  "log_third_eigenvalue",
                                   "information_volume",
                                   "lower_observed",
                                   "higher_observed",
@@ -156,7 +160,15 @@ constexpr const char* kNames[] = {"log_match_support",
                                   "log_uncovered",
                                   "log_odds",
                                   "margin",
-                                  "distinct_share"};
+                                  "distinct_share",
+                                  "share",
+                                  "rival_match_inliers",
+                                  "third_match_inliers",
+                                  "rival_match_support",
+                                  "rival_weighted_overlap",
+                                  "match_inliers_lead",
+                                  "match_support_lead",
+                                  "weighted_overlap_lead"};
 static_assert(std::size(kNames) == kFeatureCount, "a name for each feature");
 
 }  // namespace
@@ -189,18 +201,44 @@ Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
   return features;
 }
 
-void add_rank(const std::vector<double>& log_odds, std::size_t mode, std::uint32_t refined,
-              Features& features) {
+void add_rank(const std::vector<double>& log_odds, const std::vector<Features>& own,
+              std::size_t mode, std::uint32_t refined, Features& features) {
   const auto bounded = [&](std::size_t k) {
     return std::clamp(log_odds[k], -kMaxLogOdds, kMaxLogOdds);
   };
-  double alternative = -kMaxLogOdds;
-  for (std::size_t k = 0; k < log_odds.size(); ++k)
-    if (k != mode) alternative = std::max(alternative, bounded(k));
+  double alternative = -kMaxLogOdds, others = 0;
+  for (std::size_t k = 0; k < log_odds.size(); ++k) {
+    if (k == mode) continue;
+    alternative = std::max(alternative, bounded(k));
+    others += portable::exp(std::min(log_odds[k] - log_odds[mode], kMaxLogOdds));
+  }
   Setter set(features);
   set(Feature::log_odds, bounded(mode));
   set(Feature::margin, bounded(mode) - alternative);
   set(Feature::distinct_share, static_cast<double>(log_odds.size()) / refined);
+  set(Feature::share, -log_at_least(others, kMinOthers));
+  // The best of the others by one term.
+  const auto best = [&](Feature feature, std::size_t rank, double none) {
+    std::vector<double> values;
+    for (std::size_t k = 0; k < own.size(); ++k)
+      if (k != mode) values.push_back(own[k][static_cast<std::size_t>(feature)]);
+    if (values.empty()) return none;
+    rank = std::min(rank, values.size() - 1);
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank),
+                     values.end(), std::greater<>());
+    return values[rank];
+  };
+  const auto rival = [&](Feature feature, double none, Feature of_rival, Feature lead) {
+    const double found = best(feature, 0, none);
+    set(of_rival, found);
+    set(lead, own[mode][static_cast<std::size_t>(feature)] - found);
+  };
+  rival(Feature::log_match_inliers, 0, Feature::rival_match_inliers, Feature::match_inliers_lead);
+  rival(Feature::log_match_support, portable::log(kMinMatchSupport), Feature::rival_match_support,
+        Feature::match_support_lead);
+  rival(Feature::log_lower_weighted_overlap, portable::log(kMinOverlap),
+        Feature::rival_weighted_overlap, Feature::weighted_overlap_lead);
+  set(Feature::third_match_inliers, best(Feature::log_match_inliers, 2, 0));
 }
 
 }  // namespace gpureg::confidence

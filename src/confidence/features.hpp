@@ -23,6 +23,7 @@ enum class Feature : std::uint8_t {
   log_lower_overlap,
   log_first_eigenvalue,
   log_second_eigenvalue,
+  log_third_eigenvalue,
   information_volume,
   // Free space; where a viewpoint is known.
   lower_observed,
@@ -40,7 +41,6 @@ enum class Feature : std::uint8_t {
   higher_normal_agreement,
   higher_near_surface,
   lower_near_surface,
-  // Sides of surfaces in place of free space; where no viewpoint is known.
   log_front_violation_far,
   higher_front_share,
   lower_front_share,
@@ -53,6 +53,16 @@ enum class Feature : std::uint8_t {
   log_odds,
   margin,
   distinct_share,
+  share,  ///< logarithm of the odds that this one of the modes is correct, if one of them is
+  // The best of the other modes by one term each, and by how much this one is ahead. In places that
+  // repeat, other poses are nearly as good; elsewhere they are not.
+  rival_match_inliers,
+  third_match_inliers,
+  rival_match_support,
+  rival_weighted_overlap,
+  match_inliers_lead,
+  match_support_lead,
+  weighted_overlap_lead,
   count
 };
 
@@ -83,16 +93,17 @@ enum class Regressand : std::uint8_t {
   confidence  ///< whether the best mode is correct
 };
 
-/// Features of one mode by its own evidence: all but log_odds, margin and distinct_share.
+/// Features of one mode by its own evidence: all before log_odds.
 Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
                      Regressand regressand);
 
-/// Sets log_odds, margin and distinct_share, the features of a mode among the others of its pair.
+/// Sets the features of a mode among the others of its pair: log_odds and all after it.
 /// @param log_odds of all modes of the pair, from rank_modes(), in any order.
-/// @param mode index into log_odds.
+/// @param own features_of() all modes, in the same order.
+/// @param mode index into both.
 /// @param refined largest number of modes that were refined, EvidenceOptions::modes: many distinct
 ///   ends of the refinement mean that the clouds determine little.
-void add_rank(const std::vector<double>& log_odds, std::size_t mode, std::uint32_t refined,
-              Features& features);
+void add_rank(const std::vector<double>& log_odds, const std::vector<Features>& own,
+              std::size_t mode, std::uint32_t refined, Features& features);
 
 }  // namespace gpureg::confidence

@@ -51,7 +51,7 @@ TEST(Features, OnlyOfAvailableEvidence) {
                  sides = features_of(some_evidence(), {false, true}, Regressand::ranking),
                  none = features_of(some_evidence(), {false, false}, Regressand::ranking);
   EXPECT_EQ(value(all, Feature::higher_observed), 0.6);
-  EXPECT_EQ(value(all, Feature::higher_front_share), 0.0) << "free space stands for it";
+  EXPECT_GT(value(all, Feature::higher_front_share), 0.0);
   EXPECT_EQ(value(sides, Feature::higher_observed), 0.0);
   EXPECT_GT(value(sides, Feature::higher_front_share), 0.0);
   EXPECT_EQ(value(none, Feature::higher_near_surface), 0.0);
@@ -85,16 +85,66 @@ TEST(Features, SmallFrontViolationsOnlyRank) {
   EXPECT_NEAR(near_of({false, true}, Regressand::confidence), std::log(0.007), 1e-12);
 }
 
+Features matched(double inliers) {
+  PoseEvidence e = some_evidence();
+  e.match_inliers = static_cast<std::uint32_t>(inliers);
+  return features_of(e, {true, true}, Regressand::confidence);
+}
+
 TEST(Features, RankAmongTheModes) {
   Features features{};
-  add_rank({3, 20, -1}, 1, 12, features);
+  const std::vector<Features> own{matched(60), matched(100), matched(20)};
+  add_rank({3, 20, -1}, own, 1, 12, features);
   EXPECT_EQ(value(features, Feature::log_odds), 14) << "bounded";
   EXPECT_EQ(value(features, Feature::margin), 11);
   EXPECT_EQ(value(features, Feature::distinct_share), 0.25);
-  add_rank({3, 20, -1}, 2, 12, features);
+  EXPECT_NEAR(value(features, Feature::share), std::log(1e4), 1e-9) << "bounded";
+  EXPECT_NEAR(value(features, Feature::rival_match_inliers), std::log(60), 1e-9);
+  EXPECT_NEAR(value(features, Feature::third_match_inliers), std::log(20), 1e-9);
+  EXPECT_NEAR(value(features, Feature::match_inliers_lead), std::log(100.0 / 60), 1e-9);
+  EXPECT_EQ(value(features, Feature::match_support_lead), 0);
+  add_rank({3, 20, -1}, own, 2, 12, features);
   EXPECT_EQ(value(features, Feature::margin), -15);
-  add_rank({3}, 0, 12, features);
+  EXPECT_LT(value(features, Feature::match_inliers_lead), 0);
+  add_rank({1, 0.5, -1}, own, 0, 12, features);
+  const double others = std::exp(-0.5) + std::exp(-2);
+  EXPECT_NEAR(value(features, Feature::share), std::log(1 / others), 1e-12);
+  add_rank({3}, {own[0]}, 0, 12, features);
   EXPECT_EQ(value(features, Feature::margin), 17) << "no other mode";
+  EXPECT_EQ(value(features, Feature::rival_match_inliers), 0);
+}
+
+// More overlap never hurts, more violation never helps, and outside of the values of the fit
+// nothing gets more certain.
+TEST(Confidence, IsMonotoneInEachFeature) {
+  const std::set<Feature> better{Feature::log_match_support,
+                                 Feature::log_match_inliers,
+                                 Feature::log_lower_weighted_overlap,
+                                 Feature::log_lower_overlap,
+                                 Feature::log_first_eigenvalue,
+                                 Feature::log_second_eigenvalue,
+                                 Feature::log_third_eigenvalue,
+                                 Feature::information_volume,
+                                 Feature::lower_normal_agreement,
+                                 Feature::higher_normal_agreement,
+                                 Feature::share,
+                                 Feature::match_inliers_lead,
+                                 Feature::match_support_lead,
+                                 Feature::weighted_overlap_lead};
+  for (const ConfidenceModel* model :
+       {&kFreeSpaceAndSurfaceSides, &kSurfaceSides, &kFreeSpace, &kOverlapAlone})
+    for (const Regression* regression : {&model->confidence, &model->overlap}) {
+      ASSERT_GT(regression->step_count, 10u);
+      EXPECT_EQ(regression->weights, Features{});
+      for (std::size_t k = 0; k < regression->step_count; ++k) {
+        const Step& step = regression->steps[k];
+        EXPECT_LT(step.from, step.to);
+        EXPECT_EQ(step.rise > 0, better.count(step.feature) > 0) << to_string(step.feature);
+      }
+      Features far{}, farther{};
+      for (std::size_t k = 0; k < kFeatureCount; ++k) far[k] = 1e6, farther[k] = 1e9;
+      EXPECT_EQ(regression->log_odds(far), regression->log_odds(farther));
+    }
 }
 
 // The library applies the numbers of confidence_model.hpp.
@@ -124,7 +174,7 @@ TEST(Confidence, OfTheGeneratedModel) {
               model.ranking.log_odds(features_of(better, available, Regressand::ranking)));
     ASSERT_GT(log_odds[0], log_odds[1]);
     Features x = features_of(better, available, Regressand::confidence);
-    add_rank(log_odds, 0, kRefined, x);
+    add_rank(log_odds, {x, features_of(worse, available, Regressand::confidence)}, 0, kRefined, x);
     const double share = probability(log_odds[0] - log_odds[1]);
     const double want =
         std::min(probability(model.confidence.log_odds(x)), share) * factor_of(overlap);
