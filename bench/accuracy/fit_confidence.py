@@ -246,6 +246,13 @@ class Run:
         self.name = f"{building}/{folder.name}"
         recorded = json.loads(pathlib.Path(result).read_text())
         pairs = [p for p in recorded["pairs"] if p["j"] - p["i"] >= MIN_SEPARATION]
+        if viewpoints == "unknown":
+            # A viewpoint that was inferred, perhaps wrongly, gives free space that was not observed.
+            pairs = [
+                p
+                for p in pairs
+                if not any(max(m["evidence"]["observed"]) > 0 for m in p.get("modes", []))
+            ]
         modes = [p.get("modes", []) for p in pairs]
         if not any(modes):
             sys.exit(f"error: {result}: no pair has a mode with evidence")
@@ -380,7 +387,15 @@ def conditional_logit(x, correct, modes_per_pair, weight):
 
     weights = np.zeros(x.shape[1])
     weights[used] = minimised(objective, np.zeros(len(used))) / scale
-    return Regression(weights, 0.0)
+    # The search for degenerate directions asks how likely a mode is by itself.
+    odds, of_mode = x @ weights, weight[pair]
+
+    def likelihood(bias):
+        z = odds + bias[0]
+        error = of_mode * (1 / (1 + np.exp(-z)) - correct)
+        return (of_mode * (np.logaddexp(0, z) - correct * z)).sum(), error.sum(keepdims=True)
+
+    return Regression(weights, float(minimised(likelihood, np.array([-odds.mean()]))[0]))
 
 
 def monotone(x, y, weight):
@@ -573,6 +588,14 @@ def figures(run, model, regressions):
     )
     sure = confidence > SURE
     out["right_above_0.9"] = 100 * correct[sure].mean() if sure.any() else None
+    reported = confidence >= REPORTED
+    out |= {
+        "above_0.9": int(sure.sum()),
+        "right_above_0.9_count": int(correct[sure].sum()),
+        "right": int(correct.sum()),
+        "from_0.5": int(reported.sum()),
+        "right_from_0.5": int(correct[reported].sum()),
+    }
     if run.fragments:
         out["above_half"] = kinds_of_false_positives(run, best, found_confidence)
     return out
@@ -748,6 +771,7 @@ def test_and_fit(runs, beside, others):
             if not left_out or not run.has(model) or (not model.free_space and run.free_space):
                 continue
             out = {
+                "kind": run.building,
                 "scene": run.name,
                 **({"label": run.label} if run.label else {}),
                 "viewpoints": run.viewpoints,

@@ -324,7 +324,16 @@ def fit(inputs, runs, absent, arguments):
             ],
         )
 
-    tested, models = fit_confidence.test_and_fit(*map(load, ROLES))
+    fitted, beside, others = map(load, ROLES)
+    if arguments.domains:
+        import fit_models
+
+        files = sorted(arguments.domains.glob("*.json"))
+        domains = [run for file in files for run in fit_models.domain_runs(file)]
+        for run in domains:
+            run.weight = 1.0  # every kind counts the same
+        fitted += [run for run in domains if not run.model]
+    tested, models = fit_confidence.test_and_fit(fitted, beside, others)
     fit_confidence.write_header(arguments.header, models)
     print(f"written: {arguments.header}")
     content = {"missing": sorted(absent), "runs": tested}
@@ -344,6 +353,9 @@ def parse():
     parser.add_argument("--allow-missing", action="store_true", help="fit without missing inputs")
     parser.add_argument(
         "--reuse-results", action="store_true", help="also those of other builds of gpureg"
+    )
+    parser.add_argument(
+        "--domains", type=pathlib.Path, help="files of domains.py --domains street,hall,objects"
     )
     parser.add_argument("--header", type=pathlib.Path)
     parser.set_defaults(output=None)

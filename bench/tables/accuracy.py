@@ -6,8 +6,6 @@ import statistics
 
 from tables.records import RESULTS, load, mean, percent, source
 
-ALL_EVIDENCE = "free_space_and_surface_sides"  # the model where both are known
-
 
 def redkitchen():
     rows = [
@@ -78,120 +76,22 @@ def other_pairs():
     return rows + ["", source(record) + "."]
 
 
-def tested():
-    """Runs of the scenes as they are, by fits without their building."""
-    return [run for run in load("confidence.json")["runs"] if "label" not in run]
-
-
-def confidence():
-    """Fits without the building that they are tested on; means over the runs (seeds) of each
-    scene.
-    """
-    groups = {}
-    for run in tested():
-        groups.setdefault((run["viewpoints"], run["model"], run["scene"]), []).append(run)
-    out = [
-        "| viewpoints | evidence beside overlap | scene | runs | correct among the modes / first, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | correct above 0.9, % |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    evidence = {
-        ALL_EVIDENCE: "free space, surface sides",
-        "surface_sides": "surface sides",
-        "free_space": "free space",
-        "overlap_alone": "neither",
-    }
-    for (viewpoints, model, scene), runs in sorted(
-        groups.items(),
-        key=lambda group: (
-            ["known", "origin", "unknown"].index(group[0][0]),
-            list(evidence).index(group[0][1]),
-        ),
-    ):
-        of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
-        out.append(
-            f"| {'the origin' if viewpoints == 'origin' else viewpoints} | {evidence[model]} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
-            f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |"
-        )
-    return out
-
-
-def unseen():
-    """The same in short: all evidence, in the simulated buildings."""
-    groups = {}
-    for run in tested():
-        if (
-            run["model"] == ("surface_sides" if run["viewpoints"] == "unknown" else ALL_EVIDENCE)
-            and "kitchen" not in run["scene"]
-        ):
-            groups.setdefault(run["viewpoints"], {}).setdefault(run["scene"], []).append(run)
-    scenes = list(groups["known"])
-    out = [f"| viewpoints | {' | '.join(scenes)} |", "| --- |" + " --- |" * len(scenes)]
-    names = {"known": "known", "origin": "the origin only", "unknown": "none"}
-    for viewpoints, of in groups.items():
-        cells = [
-            " / ".join(
-                f"{mean(run[key] for run in of[scene]):.1f}"
-                for key in ("raw", "geo_R@P95", "geo_R@P99")
-            )
-            for scene in scenes
-        ]
-        out.append(f"| {names[viewpoints]} | {' | '.join(cells)} |")
-    return out
-
-
-def other_sensors():
-    """Other sensors and voxels in the same buildings, and other buildings; all evidence."""
+def kinds():
+    """Every kind of place, scored by a fit on all other kinds."""
     groups = {}
     for run in load("confidence.json")["runs"]:
-        if run["model"] == ALL_EVIDENCE and run["viewpoints"] == "known":
-            groups.setdefault(run.get("label", "as they are"), []).append(run)
+        groups.setdefault((run["kind"], run["viewpoints"]), []).append(run)
     out = [
-        "| | scenes | first correct, % | geometric R@P95 / R@P99, % | ECE | reports above 0.5, false ones | correct above 0.9, % |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| kind | viewpoints | runs | first correct / any mode, % | R@P95, % | ECE | correct above 0.9 | correct poses reported from 0.5 on, % | precision, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for label, runs in groups.items():
-        runs = [run for run in runs if "kitchen" not in run["scene"]]
-        scenes = list(dict.fromkeys(run["scene"] for run in runs))
+    for (kind, viewpoints), runs in sorted(groups.items()):
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
-        reports = mean(run["above_half"]["reports"] for run in runs)
-        wrong = mean(
-            sum(v for key, v in run["above_half"].items() if key != "reports") for run in runs
-        )
-        buildings = len({scene.split("/")[0] for scene in scenes})
-        text = (
-            ", ".join(scenes)
-            if len(scenes) < 4
-            else f"{buildings} buildings"
-            + (f", {len(scenes)} walks" if len(scenes) > buildings else "")
-        )
+        total = lambda key: sum(run[key] for run in runs)  # noqa: B023,E731
         out.append(
-            f"| {label} | {text} | {of('raw'):.1f} | {of('geo_R@P95'):.1f} / {of('geo_R@P99'):.1f} | {of('ECE'):.3f} | {reports:.0f}, {wrong:.1f} | "
-            f"{of('right_above_0.9'):.1f} |"
-        )
-    return out
-
-
-def mistakes():
-    """Kinds of false reports, by fits without the building; means over the runs
-    of each scene.
-    """
-    groups = {}
-    for run in tested():
-        if run["model"] == ALL_EVIDENCE and run["viewpoints"] == "known" and "above_half" in run:
-            groups.setdefault(run["scene"], []).append(run["above_half"])
-    out = [
-        "| scene | reports above 0.5 | false by the 0.2 m rule | correct by the trajectories, not in gt_all | less than 5 deg and 0.3 m off | degenerate: shifted, less than 10 deg "
-        "| perceptual alias: rotated |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for scene, runs in groups.items():
-        of = {
-            key: mean(run[key] for run in runs)
-            for key in ("reports", "little_overlap", "small_error", "translated", "alias")
-        }
-        wrong = sum(of.values()) - of["reports"]
-        out.append(
-            f"| {scene} | {of['reports']:.1f} | {wrong:.1f} | {of['little_overlap']:.1f} | {of['small_error']:.1f} | {of['translated']:.1f} | {of['alias']:.1f} |"
+            f"| {kind} | {'none' if viewpoints == 'unknown' else viewpoints} | {len(runs)} | {of('raw'):.1f} / {of('generated'):.1f} | {of('geo_R@P95'):.1f} | "
+            f"{of('ECE'):.3f} | {total('right_above_0.9_count')} of {total('above_0.9')} | {100 * total('right_from_0.5') / total('right'):.0f} | "
+            f"{100 * total('right_from_0.5') / max(1, total('from_0.5')):.0f} |"
         )
     return out
 
@@ -552,10 +452,7 @@ TABLES = {
     "redkitchen_seeds": redkitchen_seeds,
     "range_pairs": range_pairs,
     "other_pairs": other_pairs,
-    "confidence": confidence,
-    "unseen": unseen,
-    "other_sensors": other_sensors,
-    "mistakes": mistakes,
+    "kinds": kinds,
     "loop_consistency": loop_consistency,
     "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,

@@ -201,12 +201,23 @@ TEST(OptionFields, LengthsOfMapsHaveTheBitsOfTheirFormulas) {
   }
 }
 
+/// Compares every field of two values of one struct.
+template <typename T>
+struct SameFields {
+  const T &a, &b;
+  template <typename M>
+  void operator()(M T::* member, const fields::Field& field) const {
+    if constexpr (std::is_arithmetic_v<M> || std::is_enum_v<M>)
+      EXPECT_EQ(a.*member, b.*member) << field.name;
+  }
+};
+
 /// The defaults are those of 5 cm: no length differs in a bit.
 TEST(OptionFields, DefaultsAreThoseOfFiveCentimetres) {
   const PrepareOptions a, b = RegistrationOptions::from_voxel_size(0.05f).prepare;
   const EvidenceOptions c, d = RegistrationOptions::from_voxel_size(0.05f).evidence;
-  EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0);
-  EXPECT_EQ(std::memcmp(&c, &d, sizeof c), 0);
+  fields::Fields<PrepareOptions>::visit(SameFields<PrepareOptions>{a, b});
+  fields::Fields<EvidenceOptions>::visit(SameFields<EvidenceOptions>{c, d});
 }
 
 }  // namespace
