@@ -89,7 +89,7 @@ def headline():
     return [
         f"Of {pairs} pairs of a real room (7-Scenes red kitchen) it registers **{share}** if the camera positions are given, in **{time}** of CPU time per pair",
         f"after a preparation of each cloud; Open3D's RANSAC registers {ransac} in {slow}, KISS-Matcher {kiss} in {slower}, preparation included. **It says when it is wrong:**",
-        f"of {sure:,} poses of LiDAR, terrestrial and object scans (most of them simulated) with a confidence above 0.9, {wrong or 'none'} {'are' if wrong > 1 else 'is'} wrong ([conditions](docs/sensors.md#the-confidence-outside-of-rooms); the exception are [bare buildings](#limits)).",
+        f"of {sure:,} poses of LiDAR, terrestrial and object scans (most of them simulated) with a confidence above 0.9, {wrong or 'none'} {'are' if wrong > 1 else 'is'} wrong ([conditions](docs/sensors.md#the-confidence-outside-of-rooms); the exception are [copies of a place](#limits)).",
     ]
 
 

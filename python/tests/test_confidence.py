@@ -118,7 +118,7 @@ def test_the_shipped_coefficients_make_the_confidences(name):
         (True, True, False): {"log_front_violation_near"},
         (False, True, True): {"log_higher_weighted_overlap"},
     }
-    assert differs == ranking_alone.get(tuple(model), set())
+    assert differs == ranking_alone.get(tuple(model)[:3], set())
 
 
 def test_the_header_is_of_todays_format():
@@ -126,33 +126,55 @@ def test_the_header_is_of_todays_format():
     assert "".join(written.split()) == "".join(HEADER.split())
 
 
-def test_features_of_each_model_are_those_with_weights():
+RANK = (
+    "log_odds",
+    "margin",
+    "distinct_share",
+    "share",
+    "rival_match_inliers",
+    "third_match_inliers",
+)
+RANK += ("rival_match_support", "rival_weighted_overlap")
+RANK += ("match_inliers_lead", "match_support_lead", "weighted_overlap_lead")
+
+
+def test_models_use_features_that_their_evidence_has():
     names = np.array(_core._confidence_feature_names())
     assert len(set(names)) == len(names)
-    rank = {"log_odds", "margin", "distinct_share"}
     for name, regressions in fit_confidence.read_header(HEADER).items():
+        model = fit_confidence.ALL_MODELS[name]
         for stage, regressand in (("ranking", "ranking"), ("confidence", "confidence")):
-            x = _core._confidence_features(
-                some_evidence(), *fit_confidence.ALL_MODELS[name], regressand
-            )
-            used = set(names[(x != 0).any(0)]) | (rank if stage == "confidence" else set())
-            assert used == set(names[regressions[stage].weights != 0]), (name, stage)
+            x = _core._confidence_features(some_evidence(), *model[:3], regressand)
+            there = set(names[(x != 0).any(0)]) | (set(RANK) if stage == "confidence" else set())
+            of = regressions[stage]
+            used = set(names[of.weights != 0]) | {names[k] for k, *_ in of.steps}
+            assert used and used <= there, (name, stage)
+            if model.additive and stage == "confidence":
+                assert all(
+                    np.sign(rise) == fit_confidence.SIGNS[names[k]] for k, _, _, rise in of.steps
+                )
 
 
 def test_rank_among_the_modes_of_each_pair():
     names = _core._confidence_feature_names()
-    table = _core._confidence_rank_features([3.0, 20.0, 1.0], [2, 0, 1], 10)
-    rows = [
-        {name: value for name, value in zip(names, row) if value != 0} for row in table.tolist()
+    own = np.zeros((3, len(names)))
+    own[:, names.index("log_match_inliers")] = 4, 5, 3
+    odds = [3.0, 20.0, 1.0]
+    table = _core._confidence_rank_features(odds, own, [2, 0, 1], 10)
+    rows = [dict(zip(names, row)) for row in table.tolist()]
+    assert [(r["log_odds"], r["margin"], r["distinct_share"]) for r in rows] == [
+        (3, -11, 0.2),
+        (14, 11, 0.2),
+        (1, 15, 0.1),
     ]
-    assert rows == [
-        {"log_odds": 3, "margin": -11, "distinct_share": 0.2},
-        {"log_odds": 14, "margin": 11, "distinct_share": 0.2},
-        {"log_odds": 1, "margin": 15, "distinct_share": 0.1},
-    ]
+    assert [r["rival_match_inliers"] for r in rows] == [5, 4, 0]
+    assert [r["match_inliers_lead"] for r in rows] == [-1, 1, 3]
+    assert rows[1]["share"] == pytest.approx(np.log(1e4))
     for counts in ([2], [2, 2]):
         with pytest.raises(ValueError, match="modes_per_pair"):
-            _core._confidence_rank_features([3.0, 20.0, 1.0], counts, 10)
+            _core._confidence_rank_features(odds, own, counts, 10)
+    with pytest.raises(ValueError, match="own"):
+        _core._confidence_rank_features(odds, own[:2], [2, 1], 10)
 
 
 def test_wrong_evidence_is_named():
