@@ -259,7 +259,7 @@ INSTANTIATE_TEST_SUITE_P(
             {"note: the viewpoint of", "away from its points", "frame of the cloud"}},
         Use{"CamerasOfAnotherScene",
             joined({"batch", "scans", "-o", "/dev/null"}, kSmall),
-            0,
+            1,
             {"note: the viewpoint of", "away from its points", "1 more"}},
         Use{"APoseWithAngles",
             align("a.ply", "b.ply", with("--initial", "angles.txt")),
