@@ -76,7 +76,7 @@ def other_pairs():
     return rows + ["", source(record) + "."]
 
 
-def kinds():
+def kinds_of_places():
     """Every kind of place, scored by a fit on all other kinds."""
     groups = {}
     for run in load("confidence.json")["runs"]:
@@ -452,7 +452,7 @@ TABLES = {
     "redkitchen_seeds": redkitchen_seeds,
     "range_pairs": range_pairs,
     "other_pairs": other_pairs,
-    "kinds": kinds,
+    "kinds_of_places": kinds_of_places,
     "loop_consistency": loop_consistency,
     "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,
