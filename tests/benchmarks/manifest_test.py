@@ -74,7 +74,7 @@ class Manifest(unittest.TestCase):
             (lambda m: m["runs"][0].update(role="moon"), "role"),
             (lambda m: m["scenes"]["house/A"].pop("data"), "scene house/A"),
             (lambda m: m["scenes"]["bookstore/1"].update(mesh="moon"), "no mesh moon"),
-            (lambda m: m["scenes"]["drift/house/A"].update(script="moon.py"), "no script moon.py"),
+            (lambda m: m["scenes"]["unknown/house/A"].update(script="moon.py"), "no script moon.py"),
             (lambda m: m["meshes"]["house"].pop("commit"), "mesh house: no commit"),
         ):
             manifest = copy.deepcopy(self.manifest)
@@ -82,13 +82,13 @@ class Manifest(unittest.TestCase):
             self.assertIn(expected, "\n".join(rebuild.check(manifest)))
 
     def test_missing_data_is_named(self):
-        runs = [run for run in self.runs if run.scene in ("house/A", "noise/house/A", "gen401")]
+        runs = [run for run in self.runs if run.scene in ("house/A", "unknown/house/A", "gen401")]
         absent = rebuild.missing(self.inputs, runs)
-        self.assertEqual(set(absent), {"house/A", "noise/house/A"})
+        self.assertEqual(set(absent), {"house/A", "unknown/house/A"})
         self.assertIn("gt.log", absent["house/A"])
 
     def test_a_result_of_another_recipe_or_build_is_made_again(self):
-        run = next(run for run in self.runs if run.scene == "noise/house/A")
+        run = next(run for run in self.runs if run.scene == "unknown/house/A")
         result = self.inputs.result(run)
         result.parent.mkdir()
         result.write_text("{}")
@@ -96,7 +96,7 @@ class Manifest(unittest.TestCase):
         rebuild.stamp(result, rebuild.origin_of(self.inputs, run))
         self.assertTrue(rebuild.done(self.inputs, run))
         changed = copy.deepcopy(self.manifest)
-        changed["scenes"]["noise/house/A"]["options"] = ["--noise", "0.02"]
+        changed["scenes"]["unknown/house/A"]["options"] = ["--origin"]
         self.assertFalse(rebuild.done(inputs_of(changed, self.inputs.work), run))
         self.inputs.arguments.gpureg.write_text("another")
         again = rebuild.Inputs(self.inputs.arguments, self.manifest)
@@ -111,7 +111,7 @@ class Command(unittest.TestCase):
         return subprocess.run([sys.executable, script, *words], capture_output=True, text=True)
 
     def test_dry_run(self):
-        done = self.run_script("--dry-run", "--only", "gen40[12]*", "--data", "nowhere")
+        done = self.run_script("--dry-run", "--only", "gen40[12], voxels of 0.05 m*", "--data", "nowhere")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(len(done.stdout.splitlines()), 4)
         self.assertIn("generate", done.stdout)
