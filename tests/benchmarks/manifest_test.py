@@ -74,7 +74,10 @@ class Manifest(unittest.TestCase):
             (lambda m: m["runs"][0].update(role="moon"), "role"),
             (lambda m: m["scenes"]["house/A"].pop("data"), "scene house/A"),
             (lambda m: m["scenes"]["bookstore/1"].update(mesh="moon"), "no mesh moon"),
-            (lambda m: m["scenes"]["unknown/house/A"].update(script="moon.py"), "no script moon.py"),
+            (
+                lambda m: m["scenes"]["unknown/house/A"].update(script="moon.py"),
+                "no script moon.py",
+            ),
             (lambda m: m["meshes"]["house"].pop("commit"), "mesh house: no commit"),
         ):
             manifest = copy.deepcopy(self.manifest)
@@ -111,7 +114,9 @@ class Command(unittest.TestCase):
         return subprocess.run([sys.executable, script, *words], capture_output=True, text=True)
 
     def test_dry_run(self):
-        done = self.run_script("--dry-run", "--only", "gen40[12], voxels of 0.05 m*", "--data", "nowhere")
+        done = self.run_script(
+            "--dry-run", "--only", "gen40[12], voxels of 0.05 m*", "--data", "nowhere"
+        )
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(len(done.stdout.splitlines()), 4)
         self.assertIn("generate", done.stdout)

@@ -94,7 +94,8 @@ TEST(Generate, BadValues) {
   expect_refused({"generate", out / "a", "--fragments", "-3"}, {"fragments", "-3"});
   expect_refused({"generate", out / "a", "--frames-per-fragment", "0"},
                  {"frames_per_fragment", "0"});
-  expect_refused({"generate", out / "a", "--seed", "-1"}, {"--seed", "'-1', expected a whole number, 0 or more"});
+  expect_refused({"generate", out / "a", "--seed", "-1"},
+                 {"--seed", "'-1', expected a whole number, 0 or more"});
   expect_refused({"generate", out / "a", "--seed", "18446744073709551616"},
                  {"--seed", "too large"});
   const std::string file = out.write("file", "mine");

@@ -131,8 +131,7 @@ TEST(Confidence, IsMonotoneInEachFeature) {
                                  Feature::match_inliers_lead,
                                  Feature::match_support_lead,
                                  Feature::weighted_overlap_lead};
-  for (const ConfidenceModel* model :
-       {&kFreeSpaceAndSurfaceSides, &kSurfaceSides, &kFreeSpace})
+  for (const ConfidenceModel* model : {&kFreeSpaceAndSurfaceSides, &kSurfaceSides, &kFreeSpace})
     for (const Regression* regression : {&model->confidence, &model->overlap}) {
       ASSERT_GT(regression->step_count, 10u);
       EXPECT_EQ(regression->weights, Features{});
