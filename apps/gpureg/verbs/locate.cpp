@@ -76,7 +76,7 @@ Eigen::Vector3d sides_of(const PointCloud& cloud) {
   return box.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(box.sizes().cast<double>());
 }
 
-std::string text_of(const Eigen::Vector3d& sides) {
+std::string extent_text(const Eigen::Vector3d& sides) {
   return significant(sides.x(), 3) + " x " + significant(sides.y(), 3) + " x " +
          significant(sides.z(), 3);
 }
@@ -99,7 +99,8 @@ struct Search {
   Eigen::Vector3d scan_sides, map_sides;  ///< of the boxes around their points
 
   std::string sides() const {
-    return "the scan extends over " + text_of(scan_sides) + ", the map over " + text_of(map_sides);
+    return "the scan extends over " + extent_text(scan_sides) + ", the map over " +
+           extent_text(map_sides);
   }
   /// By more than what a scan sees beyond the edge of a map.
   bool scan_is_larger() const { return scan_sides.maxCoeff() > 2 * map_sides.maxCoeff(); }
