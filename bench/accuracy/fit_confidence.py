@@ -40,49 +40,19 @@ import itertools
 import json
 import multiprocessing
 import pathlib
-import re
-import shutil
-import subprocess
 import sys
-from typing import NamedTuple
 
 import numpy as np
+from confidence_header import write_header
 from record import save
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-
-
-class Model(NamedTuple):
-    """The evidence beside the overlap that a model has."""
-
-    free_space: bool
-    surface_sides: bool
-    model: bool = False  # one of the clouds is a closed surface
-    flat: bool = False  # scans of 2-D scanners
-
-    @property
-    def additive(self):
-        return not self.model and not self.flat and not self.overlap_alone
-
-    @property
-    def overlap_alone(self):
-        return not self.free_space and not self.surface_sides
-
-
-MODELS = {
-    "free_space_and_surface_sides": Model(True, True),
-    "surface_sides": Model(False, True),
-    "free_space": Model(True, False),
-    "overlap_alone": Model(False, False),
-    "model": Model(False, True, True),
-}
-# Of 2-D scans, which have the same features; see bench/flat_scans.
-FLAT_MODELS = {
-    "flat": Model(True, True, False, True),
-    "flat_surface_sides": Model(False, True, False, True),
-}
-ALL_MODELS = {**MODELS, **FLAT_MODELS}
-REGRESSIONS = ("ranking", "confidence", "overlap")
+from regressions import (
+    LINEAR_RANK,
+    MODELS,
+    conditional_logit,
+    library,
+    logistic,
+    monotone,
+)
 
 MAX_ERROR = 0.2  # metres, Redwood's rule for a correct pose
 MIN_SEPARATION = 2  # j - i: neighbours in the sequence do not count in Redwood's protocol
@@ -90,66 +60,10 @@ MIN_SEPARATION = 2  # j - i: neighbours in the sequence do not count in Redwood'
 # Inverse strengths of the L2 penalty. Chosen among 38 settings by the tables of docs/accuracy.md
 # and by a correct pose in a changed place.
 STRENGTHS = {"ranking": 0.15, "confidence": 0.00025, "overlap": 1.0}
-# Of the additive regressions: the direction in which each feature may move the odds. Others are left
-# out: what has no direction belongs to a sensor or a building.
-SIGNS = {
-    **dict.fromkeys(
-        (
-            "log_match_support",
-            "log_match_inliers",
-            "log_lower_weighted_overlap",
-            "log_lower_overlap",
-            "log_first_eigenvalue",
-            "log_second_eigenvalue",
-            "log_third_eigenvalue",
-            "information_volume",
-            "lower_normal_agreement",
-            "higher_normal_agreement",
-            "share",
-            "match_inliers_lead",
-            "match_support_lead",
-            "weighted_overlap_lead",
-        ),
-        1,
-    ),
-    **dict.fromkeys(
-        (
-            "higher_violation_of_all",
-            "lower_violation_of_all",
-            "higher_violation",
-            "lower_violation",
-            "log_higher_violation",
-            "log_violation_of_all",
-            "log_front_violation_near",
-            "log_front_violation_far",
-            "log_behind_surface",
-            "higher_front_share",
-            "lower_front_share",
-            "higher_behind_share",
-            "lower_behind_share",
-            "distinct_share",
-            "rival_match_inliers",
-            "third_match_inliers",
-            "rival_match_support",
-            "rival_weighted_overlap",
-        ),
-        -1,
-    ),
-}
-KNOTS = 5  # of a feature: quantiles from END to 1 - END
-END = 0.005
-STEP_PENALTY = 3.0  # half of it times the square of each rise; pairs count one on average
-RANK_PENALTY = 3.0  # the same of the weights of standardised features in the ranking
-MIN_RISE = 5e-4  # of a step that the header keeps
 EASY = 0.7  # share of the pairs without a correct mode that are easy: those with the fewest matches ...
 EASY_KEPT = 0.25  # ... of which this share is fitted, and stands for the others
-LINEAR_RANK = ("log_odds", "margin", "distinct_share")  # the rank in regressions linear in it
 
 MODEL_STRENGTH = 1.0  # of the regressions for models, which have two features and the rank
-NO_PENALTY = 1e6  # for slope and intercept, which two numbers cannot overfit
-MAX_DESCENT = 200  # iterations of the additive regressions and of the ranking
-MAX_ITERATIONS = 5000  # of the solver, which warns where they are too few
-MIN_SCALE = 1e-9  # bounds the standard deviation of a constant feature
 
 # Changed places. bench/results/accuracy_attempts.json compares weights; the two bounds were chosen by
 # hand.
@@ -166,13 +80,6 @@ REPORTED, SURE = 0.5, 0.9  # confidences: the default threshold, and one of litt
 # moved along a wall; all others are in another place that looks alike.
 SMALL_ERROR = (5.0, 0.3)  # degrees, metres
 MAX_TRANSLATED_DEGREES = 10.0
-
-
-def library():
-    """The compiled module, which has the features."""
-    from gpureg import _core
-
-    return _core
 
 
 def blocks(path, size):
@@ -336,119 +243,6 @@ def changed(evidence, side, share, near):
     out["occluded"][of_side] *= 1 - observed
     out["match_support"] *= 1 - share
     return out
-
-
-class Regression:
-    """weights: one per feature of the library; steps: (feature, from, to, rise)."""
-
-    def __init__(self, weights, bias, steps=()):
-        self.weights, self.bias, self.steps = weights, bias, list(steps)
-
-    def log_odds(self, x):
-        out = x @ self.weights + self.bias
-        for feature, start, end, rise in self.steps:
-            out = out + rise * np.clip((x[:, feature] - start) / (end - start), 0, 1)
-        return out
-
-
-def minimised(objective, start, bounds=None):
-    """objective: value and gradient."""
-    from scipy.optimize import minimize  # only fits need it
-
-    return minimize(
-        objective,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=bounds,
-        options={"maxiter": MAX_DESCENT, "maxfun": 2 * MAX_DESCENT},
-    ).x
-
-
-def conditional_logit(x, correct, modes_per_pair, weight):
-    """Weights under which the correct modes of each pair get their share of the odds of all its
-    modes. Every pair has a correct one. weight: of each pair.
-    """
-    used = np.flatnonzero(x.std(0) > MIN_SCALE)
-    scale = x[:, used].std(0)
-    z = (x[:, used] - x[:, used].mean(0)) / scale
-    first = np.r_[0, np.cumsum(modes_per_pair)[:-1]]
-    pair = np.repeat(np.arange(len(first)), modes_per_pair)
-    weight = weight / weight.mean()
-
-    def objective(w):
-        odds = z @ w
-        odds = np.exp(odds - np.maximum.reduceat(odds, first)[pair])
-        of_all = np.add.reduceat(odds, first)
-        of_correct = np.maximum(np.add.reduceat(odds * correct, first), np.finfo(float).tiny)
-        share = odds / of_all[pair] - odds * correct / of_correct[pair]
-        value = -(weight * np.log(of_correct / of_all)).sum() + RANK_PENALTY / 2 * w @ w
-        return value, z.T @ (weight[pair] * share) + RANK_PENALTY * w
-
-    weights = np.zeros(x.shape[1])
-    weights[used] = minimised(objective, np.zeros(len(used))) / scale
-    # The search for degenerate directions asks how likely a mode is by itself.
-    odds, of_mode = x @ weights, weight[pair]
-
-    def likelihood(bias):
-        z = odds + bias[0]
-        error = of_mode * (1 / (1 + np.exp(-z)) - correct)
-        return (of_mode * (np.logaddexp(0, z) - correct * z)).sum(), error.sum(keepdims=True)
-
-    return Regression(weights, float(minimised(likelihood, np.array([-odds.mean()]))[0]))
-
-
-def monotone(x, y, weight):
-    """The additive regression; see SIGNS."""
-    weight = weight / weight.mean()
-    names = library()._confidence_feature_names()
-    steps, columns, bounds = [], [], [(None, None)]
-    for feature, name in enumerate(names):
-        knots = np.unique(np.quantile(x[:, feature], np.linspace(END, 1 - END, KNOTS)))
-        if name not in SIGNS or not np.ptp(knots) > MIN_SCALE:
-            continue
-        for start, end in itertools.pairwise(knots):
-            if end - start > MIN_SCALE:
-                steps.append((feature, start, end))
-                columns.append(np.clip((x[:, feature] - start) / (end - start), 0, 1))
-                bounds.append((0, None) if SIGNS[name] > 0 else (None, 0))
-    ramps = np.stack(columns, 1)
-
-    def objective(p):
-        odds = ramps @ p[1:] + p[0]
-        value = (weight * (np.logaddexp(0, odds) - y * odds)).sum()
-        error = weight * (1 / (1 + np.exp(-odds)) - y)
-        gradient = np.r_[error.sum(), ramps.T @ error + STEP_PENALTY * p[1:]]
-        return value + STEP_PENALTY / 2 * p[1:] @ p[1:], gradient
-
-    start = np.zeros(len(bounds))
-    start[0] = np.log((weight * y).sum() / (weight * ~y).sum())
-    bias, *rises = minimised(objective, start, bounds)
-    kept = [(*step, rise) for step, rise in zip(steps, rises) if abs(rise) > MIN_RISE]
-    return Regression(np.zeros(x.shape[1]), float(bias), kept)
-
-
-def logistic(x, y, weight, strength):
-    """Logistic regression on standardised features, written as weights of the features themselves.
-
-    strength: inverse of the L2 penalty. Where few buildings leave weights undetermined, a strong
-    penalty shares them out among similar features, which orders the poses of other buildings better. It also draws
-    all odds together, so slope and intercept are fitted again without it."""
-    from sklearn.linear_model import LogisticRegression  # only fits need it
-
-    used = np.flatnonzero((x != 0).any(0))  # others belong to another model
-    mean, scale = x[:, used].mean(0), np.maximum(x[:, used].std(0), MIN_SCALE)
-    fit = LogisticRegression(C=strength, max_iter=MAX_ITERATIONS).fit(
-        (x[:, used] - mean) / scale, y, weight
-    )
-    weights = np.zeros(x.shape[1])
-    weights[used] = fit.coef_[0] / scale
-    first = Regression(weights, float(fit.intercept_[0] - (weights[used] * mean).sum()))
-    again = LogisticRegression(C=NO_PENALTY, max_iter=MAX_ITERATIONS).fit(
-        first.log_odds(x)[:, None], y, weight
-    )
-    slope, intercept = float(again.coef_[0, 0]), float(again.intercept_[0])
-    return Regression(slope * first.weights, slope * first.bias + intercept)
 
 
 def best_modes(run, model, ranking):
@@ -624,101 +418,6 @@ def kinds_of_false_positives(run, best, confidence):
             kind = "translated" if degrees < MAX_TRANSLATED_DEGREES else "alias"
         out[kind] += 1
     return out
-
-
-def constant(name):
-    """The C++ constant of a model: kFreeSpace for free_space."""
-    return "k" + "".join(word.capitalize() for word in name.split("_"))
-
-
-def steps_of(name, stage):
-    return f"{constant(name)}{stage.capitalize()}Steps"
-
-
-def header(models):
-    """C++ of the models by name, each a dictionary of regressions; not yet formatted."""
-    names = library()._confidence_feature_names()
-
-    def regression(of, constant):
-        if of.steps:
-            return f"additive({of.bias:.9g}, {constant})"
-        weights = ", ".join(
-            f"{{Feature::{name}, {weight:.9g}}}"
-            for name, weight in zip(names, of.weights)
-            if weight != 0
-        )
-        return f"{{weights({{{weights}}}), {of.bias:.9g}}}"
-
-    lines = [
-        "// SPDX-License-Identifier: BSD-3-Clause",
-        "// Written by bench/accuracy/fit_confidence.py; docs/accuracy.md has its accuracy.",
-        "#pragma once",
-        "",
-        '#include "confidence/regression.hpp"',
-        "",
-        "namespace gpureg::confidence {",
-        "",
-    ]
-    for name, of in models.items():
-        for stage in REGRESSIONS:
-            if of[stage].steps:
-                listed = ", ".join(
-                    f"{{Feature::{names[k]}, {start:.9g}, {end:.9g}, {rise:.9g}}}"
-                    for k, start, end, rise in of[stage].steps
-                )
-                lines += [f"constexpr Step {steps_of(name, stage)}[] = {{{listed}}};", ""]
-        three = ", ".join(regression(of[stage], steps_of(name, stage)) for stage in REGRESSIONS)
-        lines += [f"constexpr ConfidenceModel {constant(name)}{{{three}}};", ""]
-    return "\n".join([*lines, "}  // namespace gpureg::confidence", ""])
-
-
-def read_header(text):
-    """The models of header(), by name."""
-    names = library()._confidence_feature_names()
-    models = {}
-    for name in ALL_MODELS:
-        body = re.search(rf"ConfidenceModel {constant(name)}\{{(.*?)\}};", text, re.DOTALL)
-        if body is None:
-            raise ValueError(f"the header has no {constant(name)}")
-        found = re.findall(
-            r"additive\(([^,]+),\s*(\w+)\)|weights\(\{(.*?)\}\),\s*([^}\s]+)\s*\}",
-            body[1] + "}",
-            re.DOTALL,
-        )
-        models[name] = {}
-        for stage, (bias, steps, weights, linear_bias) in zip(REGRESSIONS, found, strict=True):
-            of, listed = dict(re.findall(r"\{Feature::(\w+),\s*([^}\s]+)\s*\}", weights)), []
-            if steps:
-                table = re.search(rf"Step {steps}\[\] = \{{(.*?)\}};", text, re.DOTALL)[1]
-                listed = re.findall(r"\{Feature::(\w+),([^}]+)\}", table)
-            if unknown := (of.keys() | {feature for feature, _ in listed}) - set(names):
-                raise ValueError(f"the library has no feature {sorted(unknown)[0]}")
-            models[name][stage] = Regression(
-                np.array([float(of.get(feature, 0)) for feature in names]),
-                float(bias or linear_bias),
-                [(names.index(f), *map(float, numbers.split(","))) for f, numbers in listed],
-            )
-    return models
-
-
-def clang_format():
-    """The formatter of scripts/format, or another one, or None."""
-    own = ROOT / "build/format-venv/bin/clang-format"
-    return str(own) if own.exists() else shutil.which("clang-format")
-
-
-def write_header(path, models):
-    """Regressions that were not fitted stay as the header has them."""
-    shipped = read_header((ROOT / "src/confidence/confidence_model.hpp").read_text())
-    models = {name: models.get(name, shipped.get(name)) for name in ALL_MODELS}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(header(models))
-    tool = clang_format()
-    if tool is None:
-        print(f"{path} is not formatted, as there is no clang-format: run scripts/format")
-    else:
-        style = f"--style=file:{ROOT / '.clang-format'}"
-        subprocess.run([tool, "-i", style, str(path)], check=True)
 
 
 def text_of(figures):

@@ -13,10 +13,12 @@ import argparse
 import json
 import pathlib
 
+import confidence_header
 import fit_confidence
 import numpy as np
+import regressions
 
-MODEL = fit_confidence.MODELS["model"]
+MODEL = regressions.MODELS["model"]
 DOMAINS = ("parts", "figures", "cad", "cad_mesh")
 DOMAIN_WEIGHT = 1000.0  # of all pairs of a domain together
 
@@ -113,7 +115,7 @@ def main():
     if arguments.header:
         every = [run for of in runs.values() for run in of]
         models = {"model": fit_confidence.fit(every, [], MODEL)}
-        fit_confidence.write_header(arguments.header, models)
+        confidence_header.write_header(arguments.header, models)
 
 
 if __name__ == "__main__":

@@ -306,7 +306,8 @@ def make_result(inputs, run):
 
 
 def fit(inputs, runs, absent, arguments):
-    import fit_confidence  # needs numpy
+    import confidence_header  # needs numpy
+    import fit_confidence
 
     def load(role):
         return fit_confidence.parallel(
@@ -334,7 +335,7 @@ def fit(inputs, runs, absent, arguments):
             run.weight = 1.0  # every kind counts the same
         fitted += [run for run in domains if not run.model]
     tested, models = fit_confidence.test_and_fit(fitted, beside, others)
-    fit_confidence.write_header(arguments.header, models)
+    confidence_header.write_header(arguments.header, models)
     print(f"written: {arguments.header}")
     content = {"missing": sorted(absent), "runs": tested}
     words = ["bench/accuracy/rebuild_confidence.py"]

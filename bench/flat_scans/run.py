@@ -157,8 +157,9 @@ def generated_sets(arguments, work):
     A fit takes the runs of the first seed.
     """
     import fit_confidence
+    import regressions
 
-    every = {name: {} for name in fit_confidence.FLAT_MODELS}
+    every = {name: {} for name in regressions.FLAT_MODELS}
     for name, (building, seed, step, field, distance, noise) in BUILDINGS.items():
         folder = work / name.replace(" ", "_")
         if not (folder / "gt.log").exists():
@@ -185,7 +186,7 @@ def generated_sets(arguments, work):
                 every[model].setdefault(name, []).append(run)
     sets, kinds, models = [], [], {}
     for name, buildings in every.items():
-        model = fit_confidence.FLAT_MODELS[name]
+        model = regressions.FLAT_MODELS[name]
         known = "given" if name == "flat" else "none"
         of_kind = {}
         for building, runs in buildings.items():
@@ -228,9 +229,9 @@ def main():
     work = arguments.work or pathlib.Path(tempfile.mkdtemp())
     sets, kinds, models = generated_sets(arguments, work)
     if arguments.header:
-        import fit_confidence
+        import confidence_header
 
-        fit_confidence.write_header(arguments.header, models)
+        confidence_header.write_header(arguments.header, models)
     for folder in arguments.folders:
         of = [row for seed in arguments.seeds for row in results(arguments, folder, seed)]
         sets.append({"set": folder.name, "real": True, **figures(of)})

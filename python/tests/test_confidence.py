@@ -16,7 +16,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 if not (ROOT / "bench/accuracy/fit_confidence.py").exists():
     pytest.skip("not in a checkout", allow_module_level=True)
 sys.path.insert(0, str(ROOT / "bench/accuracy"))
+import confidence_header
 import fit_confidence
+from regressions import ALL_MODELS, MODELS, SIGNS
 
 HEADER = (ROOT / "src/confidence/confidence_model.hpp").read_text()
 SIDES = tuple(
@@ -70,9 +72,9 @@ def corner(seed, boxes, points):
     return cloud[(cloud - 1.3) @ side > -0.5] + np.random.default_rng(seed).normal(size=3) * 1e-3
 
 
-@pytest.mark.parametrize("name", fit_confidence.MODELS)
+@pytest.mark.parametrize("name", MODELS)
 def test_the_shipped_coefficients_make_the_confidences(name):
-    model, regressions = fit_confidence.MODELS[name], fit_confidence.read_header(HEADER)[name]
+    model, regressions = MODELS[name], confidence_header.read_header(HEADER)[name]
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.min_confidence = 0
     if not model.free_space:
@@ -122,7 +124,7 @@ def test_the_shipped_coefficients_make_the_confidences(name):
 
 
 def test_the_header_is_of_todays_format():
-    written = fit_confidence.header(fit_confidence.read_header(HEADER))
+    written = confidence_header.header(confidence_header.read_header(HEADER))
     assert "".join(written.split()) == "".join(HEADER.split())
 
 
@@ -141,8 +143,8 @@ RANK += ("match_inliers_lead", "match_support_lead", "weighted_overlap_lead")
 def test_models_use_features_that_their_evidence_has():
     names = np.array(_core._confidence_feature_names())
     assert len(set(names)) == len(names)
-    for name, regressions in fit_confidence.read_header(HEADER).items():
-        model = fit_confidence.ALL_MODELS[name]
+    for name, regressions in confidence_header.read_header(HEADER).items():
+        model = ALL_MODELS[name]
         for stage, regressand in (("ranking", "ranking"), ("confidence", "confidence")):
             x = _core._confidence_features(some_evidence(), *model[:3], regressand)
             there = set(names[(x != 0).any(0)]) | (set(RANK) if stage == "confidence" else set())
@@ -150,9 +152,7 @@ def test_models_use_features_that_their_evidence_has():
             used = set(names[of.weights != 0]) | {names[k] for k, *_ in of.steps}
             assert used and used <= there, (name, stage)
             if model.additive and stage == "confidence":
-                assert all(
-                    np.sign(rise) == fit_confidence.SIGNS[names[k]] for k, _, _, rise in of.steps
-                )
+                assert all(np.sign(rise) == SIGNS[names[k]] for k, _, _, rise in of.steps)
 
 
 def test_rank_among_the_modes_of_each_pair():
