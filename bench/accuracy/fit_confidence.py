@@ -43,9 +43,10 @@ import pathlib
 import sys
 
 import numpy as np
-from confidence_header import write_header
 from record import save
-from regressions import (
+
+from confidence.model_header import write_header
+from confidence.regressions import (
     LINEAR_RANK,
     MODELS,
     conditional_logit,

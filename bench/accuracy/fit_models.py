@@ -13,10 +13,10 @@ import argparse
 import json
 import pathlib
 
-import confidence_header
 import fit_confidence
 import numpy as np
-import regressions
+
+from confidence import model_header, regressions
 
 MODEL = regressions.MODELS["model"]
 DOMAINS = ("parts", "figures", "cad", "cad_mesh")
@@ -115,7 +115,7 @@ def main():
     if arguments.header:
         every = [run for of in runs.values() for run in of]
         models = {"model": fit_confidence.fit(every, [], MODEL)}
-        confidence_header.write_header(arguments.header, models)
+        model_header.write_header(arguments.header, models)
 
 
 if __name__ == "__main__":

@@ -306,8 +306,9 @@ def make_result(inputs, run):
 
 
 def fit(inputs, runs, absent, arguments):
-    import confidence_header  # needs numpy
     import fit_confidence
+
+    from confidence import model_header  # needs numpy
 
     def load(role):
         return fit_confidence.parallel(
@@ -335,7 +336,7 @@ def fit(inputs, runs, absent, arguments):
             run.weight = 1.0  # every kind counts the same
         fitted += [run for run in domains if not run.model]
     tested, models = fit_confidence.test_and_fit(fitted, beside, others)
-    confidence_header.write_header(arguments.header, models)
+    model_header.write_header(arguments.header, models)
     print(f"written: {arguments.header}")
     content = {"missing": sorted(absent), "runs": tested}
     words = ["bench/accuracy/rebuild_confidence.py"]

@@ -157,7 +157,8 @@ def generated_sets(arguments, work):
     A fit takes the runs of the first seed.
     """
     import fit_confidence
-    import regressions
+
+    from confidence import regressions
 
     every = {name: {} for name in regressions.FLAT_MODELS}
     for name, (building, seed, step, field, distance, noise) in BUILDINGS.items():
@@ -229,9 +230,9 @@ def main():
     work = arguments.work or pathlib.Path(tempfile.mkdtemp())
     sets, kinds, models = generated_sets(arguments, work)
     if arguments.header:
-        import confidence_header
+        from confidence import model_header
 
-        confidence_header.write_header(arguments.header, models)
+        model_header.write_header(arguments.header, models)
     for folder in arguments.folders:
         of = [row for seed in arguments.seeds for row in results(arguments, folder, seed)]
         sets.append({"set": folder.name, "real": True, **figures(of)})

@@ -16,9 +16,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 if not (ROOT / "bench/accuracy/fit_confidence.py").exists():
     pytest.skip("not in a checkout", allow_module_level=True)
 sys.path.insert(0, str(ROOT / "bench/accuracy"))
-import confidence_header
 import fit_confidence
-from regressions import ALL_MODELS, MODELS, SIGNS
+
+from confidence import model_header
+from confidence.regressions import ALL_MODELS, MODELS, SIGNS
 
 HEADER = (ROOT / "src/confidence/confidence_model.hpp").read_text()
 SIDES = tuple(
@@ -74,7 +75,7 @@ def corner(seed, boxes, points):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_shipped_coefficients_make_the_confidences(name):
-    model, regressions = MODELS[name], confidence_header.read_header(HEADER)[name]
+    model, regressions = MODELS[name], model_header.read_header(HEADER)[name]
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.min_confidence = 0
     if not model.free_space:
@@ -124,7 +125,7 @@ def test_the_shipped_coefficients_make_the_confidences(name):
 
 
 def test_the_header_is_of_todays_format():
-    written = confidence_header.header(confidence_header.read_header(HEADER))
+    written = model_header.header(model_header.read_header(HEADER))
     assert "".join(written.split()) == "".join(HEADER.split())
 
 
@@ -143,7 +144,7 @@ RANK += ("match_inliers_lead", "match_support_lead", "weighted_overlap_lead")
 def test_models_use_features_that_their_evidence_has():
     names = np.array(_core._confidence_feature_names())
     assert len(set(names)) == len(names)
-    for name, regressions in confidence_header.read_header(HEADER).items():
+    for name, regressions in model_header.read_header(HEADER).items():
         model = ALL_MODELS[name]
         for stage, regressand in (("ranking", "ranking"), ("confidence", "confidence")):
             x = _core._confidence_features(some_evidence(), *model[:3], regressand)

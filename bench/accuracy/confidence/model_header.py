@@ -7,9 +7,10 @@ import shutil
 import subprocess
 
 import numpy as np
-from regressions import ALL_MODELS, REGRESSIONS, Regression, library
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from confidence.regressions import ALL_MODELS, REGRESSIONS, Regression, library
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 
 
 def constant(name):
