@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "pose_graph/components.hpp"
 #include "pose_graph/initialise.hpp"
 #include "pose_graph/robust/consensus.hpp"
+#include "pose_graph/robust/join_parts.hpp"
 #include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::pose_graph {
@@ -162,43 +162,27 @@ class GncSolver {
         seen[k] = fresh[k];
       }
       if (any_flag(fresh)) {
-        bool apart = false;
-        estimate = restarted(std::move(estimate), fresh, consensus.modes, apart);
-        if (!first) fresh = explained(estimate, fresh);
+        for (int k = 0; k < edges; ++k)
+          if (fresh[k]) estimate.selection.modes[k] = consensus.modes[k];
+        bool joined = false;
+        if (first) {
+          poses_from_paths(problem_, known_, fresh, estimate.selection.modes, estimate.poses);
+        } else {
+          joined = join_parts(problem_, known_, seen, quantile_, estimate);
+          for (int k = 0; k < edges; ++k)
+            admitted[k] = admitted[k] || estimate.selection.weights[k] > 0.5;
+          fresh = explained(estimate, fresh);
+        }
         for (int k = 0; k < edges; ++k) admitted[k] = admitted[k] || fresh[k];
-        // Least squares is a good start while nearly all loops are correct, and where new poses of
-        // a part came from single paths. Among later loops may be false ones that agree with each
-        // other; then the estimate is a better start.
-        if (first || any_flag(fresh))
-          estimate = graduated(std::move(estimate), admitted, first || apart);
+        // Least squares is a good start while nearly all loops are correct. Among later loops may
+        // be false ones that agree with each other; then the estimate is a better start.
+        if (first || joined || any_flag(fresh))
+          estimate = graduated(std::move(estimate), admitted, first);
         first = false;
         if (estimate.failed || control_.cancelled) return estimate;
       }
       if (last) break;
     }
-    return estimate;
-  }
-
-  /// Poses of nodes that the accepted edges do not connect to the known nodes, from paths over
-  /// trusted loops. apart: out, there are such nodes.
-  Estimate restarted(Estimate estimate, const std::vector<char>& trusted,
-                     const std::vector<int>& modes, bool& apart) const {
-    const std::vector<int> component = components_of(problem_, [&](int k) {
-      return problem_.edges[k].odometry || estimate.selection.weights[k] > 0.5;
-    });
-    std::vector<char> held(known_);
-    const auto anchor = std::find(known_.begin(), known_.end(), 1) - known_.begin();
-    apart = false;
-    for (int node = 0; node < problem_.node_count(); ++node) {
-      if (component[node] == component[anchor]) held[node] = 1;
-      apart |= !held[node];
-    }
-    std::vector<char> sure = trusted;
-    for (int k = 0; k < problem_.edge_count(); ++k) {
-      if (estimate.selection.weights[k] > 0.5) sure[k] = 1;
-      if (trusted[k]) estimate.selection.modes[k] = modes[k];
-    }
-    if (apart) poses_from_paths(problem_, held, sure, estimate.selection.modes, estimate.poses);
     return estimate;
   }
 
