@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "pair_results.hpp"
 
@@ -59,7 +60,14 @@ struct TwinBays : PairResults {
         }));
   }
 
-  std::vector<char> trusted() const { return pairs_along_the_path(sensors(), pairs, results, {}); }
+  std::optional<std::vector<char>> trusted() const {
+    return pairs_along_the_path(sensors(), pairs, results, {});
+  }
+
+  bool look_alike() const { return look_alike(reconstruct_from_poses(kScans, pairs, results)); }
+  bool look_alike(const Reconstruction& map) const {
+    return places_look_alike(map, sensors(), pairs, results);
+  }
 };
 
 std::vector<std::uint32_t> in_order() {
@@ -72,15 +80,14 @@ TEST(Path, AliasesCollapseAMapAndShow) {
   const TwinBays set(in_order());
   const Reconstruction map = reconstruct_from_poses(kScans, set.pairs, set.results);
   EXPECT_GT(set.wrong_edges(map), 10u);
-  EXPECT_TRUE(places_look_alike(map, sensors()));
+  EXPECT_TRUE(set.look_alike(map));
 }
 
 TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
   TwinBays set(in_order());
   for (std::size_t k = 0; k < set.pairs.size(); ++k)
     if (set.pairs[k].source >= set.pairs[k].target + kBay) set.results[k].has_candidate = false;
-  EXPECT_FALSE(
-      places_look_alike(reconstruct_from_poses(kScans, set.pairs, set.results), sensors()));
+  EXPECT_FALSE(set.look_alike());
 }
 
 TEST(Path, FewRejectedPairsOfManySayNothing) {
@@ -93,15 +100,55 @@ TEST(Path, FewRejectedPairsOfManySayNothing) {
       map.edges[k].pair_confidence = 0.99;
       map.edges[k].accepted = k >= rejected;
     }
-    return places_look_alike(map, sensors());
+    return places_look_alike(map, sensors(), {}, {});
   };
   EXPECT_FALSE(look_alike(15));  // more than the confidences explain
   EXPECT_TRUE(look_alike(25));
 }
 
+/// Of 400 pairs of 40 scans so many are rejected, all with a confidence that says little.
+bool rejected_of_400_look_alike(std::size_t rejected) {
+  Reconstruction map;
+  map.scans.resize(kScans);
+  for (Scan& scan : map.scans) scan.placed = true;
+  map.edges.resize(400);
+  for (std::size_t k = 0; k < map.edges.size(); ++k) {
+    map.edges[k].source = 2;  // no step of the path
+    map.edges[k].pair_confidence = 0.6;
+    map.edges[k].accepted = k >= rejected;
+  }
+  return places_look_alike(map, sensors(), {}, {});
+}
+
+TEST(Path, ManyRejectedPairsOfLittleConfidenceShowAliasesToo) {
+  EXPECT_FALSE(rejected_of_400_look_alike(40));
+  EXPECT_TRUE(rejected_of_400_look_alike(80));
+  // Few are accepted for each scan: nothing confirms the others, nothing contradicts them.
+  EXPECT_FALSE(rejected_of_400_look_alike(330));
+}
+
+/// A map of all scans at two places, as aliases make it, without any rejected pair.
+bool folded_path_looks_alike(const TwinBays& set) {
+  Reconstruction map = reconstruct_from_poses(kScans, set.pairs, set.results);
+  map.islands.resize(1);
+  for (Edge& edge : map.edges) edge.accepted = true;
+  for (std::uint32_t k = 0; k < kScans; ++k) {
+    map.scans[k].placed = true;
+    map.scans[k].island = 0;
+    map.scans[k].island_from_scan = set.world_from_scan[k];
+    if (k >= kSecond) map.scans[k].island_from_scan.translation().x() += k < 33 ? -26 : 26;
+  }
+  return set.look_alike(map);
+}
+
+TEST(Path, ScansThatJumpAlongAPathShowAliases) {
+  EXPECT_TRUE(folded_path_looks_alike(TwinBays(in_order())));
+}
+
 TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
   TwinBays set(in_order());
-  const std::vector<char> trusted = set.trusted();
+  ASSERT_TRUE(set.trusted().has_value());
+  const std::vector<char> trusted = *set.trusted();
   for (std::size_t k = 0; k < set.pairs.size(); ++k) {
     const std::uint32_t gap = set.pairs[k].source - set.pairs[k].target;
     if (!set.results[k].has_candidate) continue;
@@ -114,14 +161,17 @@ TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
   EXPECT_GE(map.islands[0].scans.size(), kScans - 1);
 }
 
-// A permutation in which no numbers that follow each other are neighbours.
-TEST(Path, NumbersInAnyOrderSayNothing) {
+/// A permutation in which no numbers that follow each other are neighbours.
+std::vector<std::uint32_t> in_any_order() {
   std::vector<std::uint32_t> number(kScans);
   for (std::uint32_t k = 0; k < kScans; ++k) number[k] = (17 * k + 5) % 40;
-  const TwinBays set(number);
-  const std::vector<char> trusted = set.trusted();
-  EXPECT_EQ(std::count(trusted.begin(), trusted.end(), 1),
-            static_cast<std::ptrdiff_t>(trusted.size()));
+  return number;
+}
+
+TEST(Path, NumbersInAnyOrderSayNothing) {
+  const TwinBays set(in_any_order());
+  EXPECT_FALSE(set.trusted().has_value());
+  EXPECT_FALSE(folded_path_looks_alike(set));
 }
 
 }  // namespace

@@ -165,11 +165,11 @@ std::vector<Eigen::Vector3d> sensors_of(const std::vector<PreparedCloud>& clouds
 }
 
 /// Takes the pairs out that are not trusted where places look alike.
+/// @param trusted of pairs_along_the_path().
 /// @return them as rejected edges.
-std::vector<Edge> keep_to_the_path(const std::vector<Eigen::Vector3d>& sensors,
-                                   const std::vector<Pair>& pairs, const Options& options,
+std::vector<Edge> keep_to_the_path(const std::vector<char>& trusted, const std::vector<Pair>& pairs,
+                                   const Options& options,
                                    std::vector<RegistrationResult>& results) {
-  const std::vector<char> trusted = pairs_along_the_path(sensors, pairs, results, options);
   std::vector<Edge> out;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     if (trusted[k] || !results[k].has_candidate || results[k].modes.empty()) continue;
@@ -188,6 +188,18 @@ std::vector<Edge> keep_to_the_path(const std::vector<Eigen::Vector3d>& sensors,
   return out;
 }
 
+/// Where places look alike and no path tells them apart, agreement says nothing: a scan agrees with
+/// all copies of its place. What is left is what a pair is worth by itself, among copies.
+void hear_each_pair_alone(std::vector<RegistrationResult>& results, Options& options) {
+  options.consistency.max_odds_factor = 1;
+  for (RegistrationResult& result : results) {
+    for (RegistrationMode& mode : result.modes)
+      mode.confidence = confidence_among_copies(mode.confidence);
+    result.score = result.modes.empty() ? confidence_among_copies(result.score)
+                                        : result.modes.front().confidence;
+  }
+}
+
 /// Edges of `ruled_out` that the map lacks, as rejected ones.
 void add_ruled_out(const std::vector<Edge>& ruled_out, Reconstruction& map) {
   std::set<std::size_t> known;
@@ -203,11 +215,13 @@ void add_ruled_out(const std::vector<Edge>& ruled_out, Reconstruction& map) {
 }
 
 /// reconstruct(), within its should_stop.
-AuditedReconstruction reconstruct_and_audit(
-    const Context& context, const std::vector<PreparedCloud>& clouds,
-    const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
-    const Options& options, const std::vector<Odometry>& odometry,
-    const RegistrationOptions& registration, const AuditOptions& audit_options) {
+AuditedReconstruction reconstruct_and_audit(const Context& context,
+                                            const std::vector<PreparedCloud>& clouds,
+                                            const std::vector<Pair>& pairs,
+                                            const std::vector<RegistrationResult>& results,
+                                            Options options, const std::vector<Odometry>& odometry,
+                                            const RegistrationOptions& registration,
+                                            const AuditOptions& audit_options) {
   audit_options.validate();
   AuditedReconstruction out;
   std::vector<RegistrationResult> left = with_likely_modes(results, options);
@@ -215,8 +229,17 @@ AuditedReconstruction reconstruct_and_audit(
   const std::vector<Eigen::Vector3d> sensors = sensors_of(clouds);
   out.places_look_alike =
       odometry.empty() &&
-      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, left, options), sensors);
-  if (out.places_look_alike) ruled_out = keep_to_the_path(sensors, pairs, options, left);
+      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, left, options), sensors, pairs,
+                        left);
+  bool heard_alone = false;
+  if (out.places_look_alike) {
+    if (const auto trusted = pairs_along_the_path(sensors, pairs, left, options)) {
+      ruled_out = keep_to_the_path(*trusted, pairs, options, left);
+    } else {
+      hear_each_pair_alone(left, options);
+      heard_alone = true;
+    }
+  }
   hear_companions(context, clouds, pairs, registration, audit_options, left);
   for (int round = 0;; ++round) {
     out.map = reconstruct_from_poses(clouds.size(), pairs, left, options, odometry);
@@ -244,6 +267,9 @@ AuditedReconstruction reconstruct_and_audit(
   }
   add_ruled_out(ruled_out, out.map);
   judge_edges(out.audit, audit_options, out.places_look_alike, out.map);
+  if (heard_alone)
+    for (Edge& edge : out.map.edges)
+      edge.map_confidence = std::min(edge.map_confidence, edge.confidence);
   return out;
 }
 

@@ -58,7 +58,16 @@ std::vector<double> weakest_between(const Audit& audit, const Reconstruction& ma
   return out;
 }
 
+double odds_of(double confidence, const Rejection& rejection) {
+  return confidence / (1 - std::min(confidence, kMostConfidence)) * rejection.ratio;
+}
+
 }  // namespace
+
+double confidence_among_copies(double confidence) {
+  const double odds = odds_of(confidence, kOfAlikePlaces);
+  return odds / (1 + odds);
+}
 
 void judge_edges(const Audit& audit, const AuditOptions& options, bool places_look_alike,
                  Reconstruction& map) {
@@ -66,8 +75,7 @@ void judge_edges(const Audit& audit, const AuditOptions& options, bool places_lo
   const Rejection& rejection = places_look_alike ? kOfAlikePlaces : kOfDistinctPlaces;
   for (std::size_t k = 0; k < map.edges.size(); ++k) {
     Edge& edge = map.edges[k];
-    const double odds =
-        edge.confidence / (1 - std::min(edge.confidence, kMostConfidence)) * rejection.ratio;
+    const double odds = odds_of(edge.confidence, rejection);
     const double margin = options.max_shift + options.max_shift_per_metre *
                                                   edge.target_from_source.translation().norm();
     if (between_islands(edge, map))
