@@ -12,6 +12,7 @@
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/sets/pair_journal.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -90,12 +91,8 @@ TEST_F(ReconstructCommand, GoesOnAfterAnInterruption) {
   {
     Command command(reconstruct("parts", {"--threads", "1"}));
     const std::string journal = file("parts", "pairs.journal");
-    const auto lines = [&] {
-      if (!std::filesystem::exists(journal)) return std::ptrdiff_t{0};
-      const std::string text = content_of(journal);
-      return std::count(text.begin(), text.end(), '\n');
-    };
-    while (command.running() && lines() < 4)
+    const auto pairs = [&] { return is_journal(journal) ? read_journal(journal).pairs.size() : 0; };
+    while (command.running() && pairs() < 3)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     command.send(SIGINT);
     const Outcome outcome = command.wait();

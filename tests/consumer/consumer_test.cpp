@@ -228,7 +228,7 @@ TEST_F(Consumer, MissingComponent) {
   const Outcome configured = configure(folder_.path(), "");
   EXPECT_NE(configured.status, 0);
   EXPECT_NE(one_line(configured.output)
-                .find(R"(no component "teleport" (it has: files, evaluation, pose_graph, )"
+                .find(R"(no component "teleport" (it has: files, evaluation, sets, pose_graph, )"
                       "reconstruction, loop_closure, localization, io"),
             std::string::npos)
       << configured.output;

@@ -2,14 +2,16 @@
 #include <algorithm>
 
 #include "fuzz/targets.hpp"
+#include "gpureg/sets/pair_journal.hpp"
 #include "inputs/initial_poses.hpp"
 #include "inputs/map_poses.hpp"
 #include "inputs/saved_map.hpp"
 #include "io/run_reader.hpp"
 #include "json/json_file.hpp"
-#include "records/journal.hpp"
 #include "records/pair_json.hpp"
 #include "records/result_file.hpp"
+#include "sets/journal_file.hpp"
+#include "sets/result_bytes.hpp"
 
 namespace gpureg::fuzz {
 namespace {
@@ -48,28 +50,30 @@ void read_result(std::string_view bytes) {
   });
 }
 
-/// The lines of the input with their checksums: mutations shall reach what stands behind them.
+/// The lines of the input as records with their checksums: mutations shall reach what stands behind
+/// them.
 std::string with_checksums(std::string_view bytes) {
-  std::string out;
+  std::string out = sets::journal_head();
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
-    out += cli::Journal::line_of(std::string(bytes.substr(at, end - at)));
+    if (end > at)
+      out += sets::record_of(static_cast<std::uint32_t>(bytes[at] & 7),
+                             bytes.substr(at + 1, end - at - 1));
     at = end + 1;
   }
   return out;
 }
 
-void read_journal(std::string_view bytes) {
-  for (const std::string& journal : {std::string(bytes), with_checksums(bytes)})
-    read(journal, [](const std::string& path) {
-      // The header of the corpus.
-      const cli::Journal read(
-          path, [](const cli::Json*) { return cli::Json{{"version", 1}}; },
-          cli::Journal::Mode::resume,
-          [](int, int, RegistrationResult&& result) {
-            if (result.has_candidate && !result.target_from_source.matrix().allFinite())
-              broken("poses are finite");
-          });
+void read_pairs_of_journal(std::string_view bytes) {
+  for (const std::string& content : {std::string(bytes), with_checksums(bytes)})
+    read(content, [](const std::string& path) {
+      const JournalContents journal = read_journal(path);
+      for (const RegistrationResult& result : journal.results) {
+        if (result.has_candidate && !result.target_from_source.matrix().allFinite())
+          broken("poses are finite");
+        if (sets::result_of(sets::bytes_of(result), path).modes.size() != result.modes.size())
+          broken("a result survives its file");
+      }
     });
 }
 
@@ -113,9 +117,12 @@ void read_reconstruction(std::string_view bytes) {
 }  // namespace
 
 std::vector<Target> command_targets() {
-  return {{"document", read_document}, {"result", read_result},
-          {"journal", read_journal},   {"initial_poses", read_initial_poses},
-          {"poses", read_poses},       {"reconstruction", read_reconstruction}};
+  return {{"document", read_document},
+          {"result", read_result},
+          {"journal", read_pairs_of_journal},
+          {"initial_poses", read_initial_poses},
+          {"poses", read_poses},
+          {"reconstruction", read_reconstruction}};
 }
 
 }  // namespace gpureg::fuzz

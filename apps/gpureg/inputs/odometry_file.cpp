@@ -44,16 +44,12 @@ std::optional<std::size_t> place_of(const Scans& scans, int number) {
 }
 
 std::vector<reconstruction::Odometry> from_log(const std::string& path, const Scans& scans,
-                                               const std::string& folder,
-                                               const std::vector<int>& unusable) {
+                                               const std::string& folder) {
   const auto scan_of = [&](int number) {
     const auto place = place_of(scans, number);
     if (!place)
       fail(path, "names fragment " + std::to_string(number) + ", which " + folder + " lacks");
     return static_cast<std::uint32_t>(*place);
-  };
-  const auto is_unusable = [&](int number) {
-    return std::find(unusable.begin(), unusable.end(), number) != unusable.end();
   };
   std::vector<reconstruction::Odometry> odometry;
   for (const evaluation::LogEntry& entry : evaluation::read_log(path)) {
@@ -61,7 +57,6 @@ std::vector<reconstruction::Odometry> from_log(const std::string& path, const Sc
       fail(path + ":" + std::to_string(entry.line),
            "is fragment " + std::to_string(entry.i) +
                " with itself, expected relative poses of two fragments");
-    if (is_unusable(entry.i) || is_unusable(entry.j)) continue;
     reconstruction::Odometry edge;
     edge.source = scan_of(entry.j);
     edge.target = scan_of(entry.i);
@@ -119,15 +114,17 @@ std::vector<UnalignedIsometry3d> poses_of(const std::string& path, const Scans& 
 
 }  // namespace
 
-std::vector<reconstruction::Odometry> read_odometry(const std::string& path,
-                                                    const std::vector<io::ScanFile>& scans,
-                                                    const std::string& folder,
-                                                    const std::vector<int>& unusable) {
-  std::vector<reconstruction::Odometry> odometry =
-      is_log(path) ? from_log(path, scans, folder, unusable)
-                   : reconstruction::odometry_of_poses(poses_of(path, scans));
-  if (odometry.empty()) fail(path, "holds no pose of two scans of " + folder);
-  return odometry;
+reconstruction::MapInput read_odometry(const std::string& path,
+                                       const std::vector<io::ScanFile>& scans,
+                                       const std::string& folder) {
+  reconstruction::MapInput known;
+  if (is_log(path))
+    known.odometry = from_log(path, scans, folder);
+  else
+    known.world_from_scan = poses_of(path, scans);
+  if (known.odometry.empty() && reconstruction::odometry_of_poses(known.world_from_scan).empty())
+    fail(path, "holds no pose of two scans of " + folder);
+  return known;
 }
 
 std::vector<UnalignedIsometry3d> read_scan_poses(const std::string& path,

@@ -5,23 +5,21 @@
 #include <vector>
 
 #include "gpureg/io.hpp"
-#include "gpureg/reconstruction.hpp"
+#include "gpureg/reconstruction/reconstruct.hpp"
 
 namespace gpureg::cli {
 
 /// Whether the first line with content has three fields, as the blocks of a Redwood log.
 bool is_log(const std::string& path);
 
-/// Relative poses of scans from a file. A trajectory (TUM, whose times are numbers or names of
-/// scans, or poses.txt) gives those of consecutive scans; a Redwood log gives its pairs.
+/// Known poses of scans from a file, as the odometry of a MapInput: a trajectory (TUM, whose times
+/// are numbers or names of scans, or poses.txt), or the pairs of a Redwood log.
 /// @param scans ascending by number.
 /// @param folder for messages.
-/// @param unusable numbers of scans whose poses are left out.
 /// @throws IoError naming the file: no such file, numbers that the folder lacks, nothing in it.
-std::vector<reconstruction::Odometry> read_odometry(const std::string& path,
-                                                    const std::vector<io::ScanFile>& scans,
-                                                    const std::string& folder,
-                                                    const std::vector<int>& unusable = {});
+reconstruction::MapInput read_odometry(const std::string& path,
+                                       const std::vector<io::ScanFile>& scans,
+                                       const std::string& folder);
 
 /// Poses of scans from a trajectory (TUM, whose times are numbers or names of scans, or poses.txt);
 /// no_pose() of scans that it lacks.

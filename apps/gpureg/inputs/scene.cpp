@@ -2,11 +2,9 @@
 #include "inputs/scene.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <optional>
 #include <set>
 
 #include "gpureg/error.hpp"
@@ -20,24 +18,6 @@
 
 namespace gpureg::cli {
 namespace {
-
-// One batch for prepare(): enough to fill a device, little beside the 1 GiB that a long run may
-// take.
-constexpr std::size_t kChunkClouds = 32, kChunkPoints = 4'000'000;
-
-void mix(std::uint64_t& hash, const std::vector<Eigen::Vector3f>& rows) {
-  const auto add = [&](std::uint64_t word) {
-    hash = (hash ^ word) * 0x9E3779B97F4A7C15ull;
-    hash ^= hash >> 32;
-  };
-  add(rows.size());
-  for (const Eigen::Vector3f& row : rows) {
-    std::uint32_t bits[3];
-    std::memcpy(bits, row.data(), sizeof(bits));
-    add(bits[0] | static_cast<std::uint64_t>(bits[1]) << 32);
-    add(bits[2]);
-  }
-}
 
 using Fragments = std::vector<io::ScanFile>;
 using Cameras = std::map<int, std::vector<Eigen::Vector3d>>;
@@ -58,47 +38,6 @@ void note_gaps(const Fragments& fragments, const Cameras& cameras, const std::st
                 << ", which the folder lacks" << std::endl;
       return;
     }
-}
-
-std::uint64_t hash_of(const PointCloud& cloud) {
-  std::uint64_t hash = 0x67707572ull;
-  mix(hash, cloud.points);
-  mix(hash, cloud.normals);
-  mix(hash, cloud.viewpoints);
-  if (!cloud.origin.isZero(0)) {
-    const Eigen::Vector3f coarse = cloud.origin.cast<float>();
-    mix(hash, {coarse, (cloud.origin - coarse.cast<double>()).cast<float>()});
-  }
-  return hash;
-}
-
-struct Prepared {
-  std::optional<PreparedCloud> cloud;
-  std::string reason;  // why there is none
-};
-
-// Of clouds that are read, those that can be prepared: together, and one by one where one cannot.
-std::vector<Prepared> prepare_usable(const Context& context, const std::vector<std::string>& names,
-                                     const std::vector<PointCloud>& clouds,
-                                     const PrepareOptions& options, bool infer_viewpoint) {
-  std::vector<PointCloudView> views;
-  for (std::size_t k = 0; k < clouds.size(); ++k) {
-    views.push_back(clouds[k].view());
-    views.back().infer_viewpoint = infer_viewpoint || !clouds[k].viewpoints.empty();
-  }
-  std::vector<Prepared> out;
-  try {
-    for (PreparedCloud& cloud : prepare_batch(context, views, options, names))
-      out.push_back({std::move(cloud), ""});
-    return out;
-  } catch (const InvalidArgument&) {
-  }
-  for (std::size_t k = 0; k < views.size(); ++k) try {
-      out.push_back({prepare_batch(context, {views[k]}, options, {names[k]}).front(), ""});
-    } catch (const InvalidArgument& error) {
-      out.push_back({std::nullopt, error.what()});
-    }
-  return out;
 }
 
 }  // namespace
@@ -159,81 +98,81 @@ void FragmentFolder::leave_out(const std::map<std::size_t, std::string>& reasons
   scans = std::move(kept_scans);
 }
 
-void FragmentFolder::leave_out_unreadable() {
-  std::map<std::size_t, std::string> reasons;
-  for (std::size_t k = 0; k < scans.size() && !InterruptGuard::requested(); ++k) try {
-      read(k, 0, MeshNote::none);
-    } catch (const IoError& error) {
-      reasons[k] = error.what();
-    }
-  leave_out(reasons);
+FolderSet::FolderSet(FragmentFolder folder, bool quiet, bool infer_viewpoint)
+    : folder_(std::move(folder)),
+      quiet_(quiet),
+      infer_viewpoint_(infer_viewpoint),
+      seen_(folder_.numbers.size()) {}
+
+LoadedCloud FolderSet::read(std::size_t k, const PrepareOptions& options) const {
+  Seen& seen = seen_[k];
+  const bool first = seen.fingerprint.empty(), tell = first && !quiet_;
+  PointCloud cloud =
+      folder_.read(k, mesh_spacing(options.voxel_size), tell ? MeshNote::print : MeshNote::none);
+  if (tell && options.depth_maps > 0) viewpoints_.see(cloud, folder_.scans[k].path);
+  const bool infer_viewpoint = infer_viewpoint_ || !cloud.viewpoints.empty();
+  if (first)
+    seen = {fingerprint_of(cloud.view()) + (infer_viewpoint ? "" : " without viewpoint"),
+            extent_of(cloud.points)};
+  LoadedCloud loaded(std::move(cloud));
+  loaded.view.infer_viewpoint = infer_viewpoint;
+  return loaded;
 }
 
-std::vector<std::pair<std::string, std::size_t>> PreparedFolder::prepared_sizes() const {
-  std::vector<std::pair<std::string, std::size_t>> out;
-  for (std::size_t k = 0; k < scans.size(); ++k) out.emplace_back(scans[k].path, clouds[k].size());
-  return out;
+void FolderSet::print_notes(const std::vector<std::size_t>& scans,
+                            const std::vector<PreparedFragment>& prepared) const {
+  viewpoints_.print();
+  if (quiet_) return;
+  SensorFixedNote note;
+  for (std::size_t k = 0; k < prepared.size(); ++k)
+    note.see(prepared[k], folder_.scans[scans[k]].path);
+  note.print();
+}
+
+PreparedSizes sizes_of(const FolderSet& set, const std::vector<std::size_t>& scans,
+                       const std::vector<PreparedFragment>& prepared) {
+  PreparedSizes sizes;
+  for (std::size_t k = 0; k < prepared.size(); ++k) {
+    sizes.extent = std::max(sizes.extent, set.extent(scans[k]));
+    sizes.points.emplace_back(set.label(scans[k]), prepared[k].cloud.size());
+  }
+  return sizes;
 }
 
 PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
                               const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
-  PreparedFolder folder{FragmentFolder(input, quiet)};
-  const std::size_t size = folder.numbers.size();
-  std::map<std::size_t, std::string> bad;
-  ViewpointNote viewpoints;
-  SensorFixedNote sensor_fixed;
-  Progress progress("preparing", "fragments", size, quiet);
-  for (std::size_t next = 0; next < size;) {
-    if (InterruptGuard::requested()) {
-      folder.interrupted = true;
-      break;
-    }
-    std::vector<PointCloud> chunk;
-    std::vector<std::size_t> places;
-    std::vector<std::string> files;
-    for (std::size_t points = 0;
-         next < size && chunk.size() < kChunkClouds && points < kChunkPoints; ++next) {
-      try {
-        chunk.push_back(folder.read(next, mesh_spacing(options.voxel_size),
-                                    quiet ? MeshNote::none : MeshNote::print));
-      } catch (const IoError& error) {
-        bad[next] = error.what();
-        continue;
-      }
-      places.push_back(next);
-      files.push_back(folder.scans[next].path);
-      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), folder.scans[next].path);
-      points += chunk.back().points.size();
-    }
-    sensor_fixed.leave_out_parts(chunk, files, infer_viewpoint);
-    const auto prepared = prepare_usable(context, files, chunk, options, infer_viewpoint);
-    for (std::size_t k = 0; k < chunk.size(); ++k) {
-      if (!prepared[k].reason.empty()) {
-        bad[places[k]] = prepared[k].reason;
-        continue;
-      }
-      folder.clouds.push_back(*prepared[k].cloud);
-      sensor_fixed.see(folder.clouds.back().statistics(), files[k]);
-      folder.hashes.push_back(hash_of(chunk[k]));
-      folder.extent = std::max(folder.extent, extent_of(chunk[k].points));
-    }
-    progress.update(next);
-  }
+  const FolderSet set(FragmentFolder(input, quiet), quiet, infer_viewpoint);
+  PreparedFolder folder{set.folder(), {}, {}, {}};
+  Progress progress("preparing", "fragments", set.size(), quiet);
+  std::vector<PreparedFragment> all =
+      prepare_all(context, set, options,
+                  {[&](std::size_t done) { progress.update(done); }, InterruptGuard::requested});
   folder.seconds = progress.seconds();
-  viewpoints.print();
-  if (!quiet) sensor_fixed.print();
+  folder.interrupted = all.size() < set.size();
+  std::vector<std::size_t> scans;
+  std::vector<PreparedFragment> usable;
+  std::map<std::size_t, std::string> bad;
+  for (std::size_t k = 0; k < all.size(); ++k)
+    if (all[k].usable()) {
+      scans.push_back(k);
+      usable.push_back(std::move(all[k]));
+      folder.identity.clouds.push_back({set.name(k), set.fingerprint(k)});
+    } else {
+      bad[k] = all[k].reason;
+    }
+  folder.clouds = clouds_of(usable);
+  folder.sizes = sizes_of(set, scans, usable);
+  set.print_notes(scans, usable);
   if (!folder.interrupted) folder.leave_out(bad);
   return folder;
 }
 
-std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const FragmentFolder& folder,
-                                                                  const std::string& pairs,
-                                                                  bool quiet) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> chosen;
+std::vector<Pair> choose_pairs(const FragmentFolder& folder, const std::string& pairs, bool quiet) {
+  std::vector<Pair> chosen;
   const auto size = static_cast<std::uint32_t>(folder.numbers.size());
   if (pairs == "all") {
     for (std::uint32_t i = 0; i < size; ++i)
-      for (std::uint32_t j = i + 1; j < size; ++j) chosen.emplace_back(i, j);
+      for (std::uint32_t j = i + 1; j < size; ++j) chosen.push_back({j, i});
     return chosen;
   }
   const auto listed = io::read_pairs(pairs, folder.all());
@@ -244,7 +183,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Fragment
     const std::pair<std::uint32_t, std::uint32_t> pair =
         std::minmax(folder.index_of(i), folder.index_of(j));
     if (seen.insert(pair).second)
-      chosen.push_back(pair);
+      chosen.push_back({pair.second, pair.first});
     else
       ++repeated;
   }

@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "gpureg/registration.hpp"
+#include "gpureg/sets/fragment_set.hpp"
+#include "gpureg/sets/pair_journal.hpp"
 #include "inputs/cloud_file.hpp"
 #include "inputs/scan_input.hpp"
+#include "run/viewpoint_note.hpp"
 
 namespace gpureg::cli {
 
@@ -47,9 +49,6 @@ class FragmentFolder {
   /// read_cloud().
   PointCloud read(std::size_t k, double spacing, MeshNote note) const;
 
-  /// Reads all files, and leaves out those that cannot be read, as leave_out() does.
-  void leave_out_unreadable();
-
   /// Leaves out the fragments at these ascending places, for the reasons given, and says so on
   /// stderr. Throws IoError where they leave less than a pair.
   void leave_out(const std::map<std::size_t, std::string>& reasons);
@@ -59,20 +58,55 @@ class FragmentFolder {
   std::map<int, std::vector<Eigen::Vector3d>> cameras_;
 };
 
+/// The fragments of a folder as the library reads them. The first time that one is read, notes what
+/// people should hear of.
+class FolderSet : public FragmentSet {
+ public:
+  /// @param quiet says nothing.
+  /// @param infer_viewpoint of fragments without a sensor position, see PointCloudView.
+  explicit FolderSet(FragmentFolder folder, bool quiet, bool infer_viewpoint = true);
+
+  std::size_t size() const override { return folder_.numbers.size(); }
+  std::string name(std::size_t k) const override { return folder_.scans[k].name; }
+  std::string label(std::size_t k) const override { return folder_.scans[k].path; }
+  LoadedCloud read(std::size_t k, const PrepareOptions& options) const override;
+  std::string fingerprint(std::size_t k) const override { return seen_[k].fingerprint; }
+  std::size_t readers() const override { return 1; }  // what they note has an order
+
+  const FragmentFolder& folder() const { return folder_; }
+  double extent(std::size_t k) const { return seen_[k].extent; }  ///< longest side of a fragment
+
+  /// Says on stderr what reading and preparation have noted.
+  /// @param scans places of those that could be used.
+  void print_notes(const std::vector<std::size_t>& scans,
+                   const std::vector<PreparedFragment>& prepared) const;
+
+ private:
+  struct Seen {
+    std::string fingerprint;
+    double extent = 0;
+  };
+  FragmentFolder folder_;
+  bool quiet_, infer_viewpoint_;
+  mutable std::vector<Seen> seen_;
+  mutable ViewpointNote viewpoints_;
+};
+
+/// What the preparation of the fragments of a folder says about the voxel size.
+struct PreparedSizes {
+  double extent = 0;  ///< longest side of the largest fragment
+  std::vector<std::pair<std::string, std::size_t>> points;  ///< file, number of prepared points
+};
+PreparedSizes sizes_of(const FolderSet& set, const std::vector<std::size_t>& scans,
+                       const std::vector<PreparedFragment>& prepared);
+
 /// The fragments of a folder, prepared; the raw clouds are let go as soon as they are.
 struct PreparedFolder : FragmentFolder {
-  PreparedFolder() = default;
-  explicit PreparedFolder(FragmentFolder folder) : FragmentFolder(std::move(folder)) {}
-
-  /// Of what went into prepare(): points, normals, sensor positions.
-  std::vector<std::uint64_t> hashes;
   std::vector<PreparedCloud> clouds;
-  double extent = 0;  ///< longest side of the largest fragment
+  RunIdentity identity;  ///< without settings
+  PreparedSizes sizes;
   double seconds = 0;
   bool interrupted = false;  ///< stopped before all were prepared
-
-  /// File and number of prepared points of each fragment.
-  std::vector<std::pair<std::string, std::size_t>> prepared_sizes() const;
 };
 
 /// Reads and prepares all fragments, and says on stderr which are left out as unusable.
@@ -86,11 +120,9 @@ PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
 /// choose_pairs(), InvalidArgument for a list without a pair.
 void check_pairs(const ScanInput& input, const std::string& pairs);
 
-/// Pairs i < j as indices into numbers, in the file's order without repetitions, or all of them for
-/// "all". Pairs of unusable fragments are left out. Unless quiet, says how many are repetitions.
-/// Throws IoError for a number that no fragment has.
-std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const FragmentFolder& folder,
-                                                                  const std::string& pairs,
-                                                                  bool quiet);
+/// Pairs of a target i and a source j > i, as indices into numbers, in the file's order without
+/// repetitions, or all of them for "all". Pairs of unusable fragments are left out. Unless quiet,
+/// says how many are repetitions. Throws IoError for a number that no fragment has.
+std::vector<Pair> choose_pairs(const FragmentFolder& folder, const std::string& pairs, bool quiet);
 
 }  // namespace gpureg::cli

@@ -2,13 +2,16 @@
 #include "options/method_options.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <iostream>
 
 #include "gpureg/error.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "inputs/calibration_file.hpp"
+#include "inputs/cloud_file.hpp"
 #include "option_names.hpp"
 #include "options/set_option.hpp"
+#include "run/spacing.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -158,6 +161,32 @@ void MethodOptions::choose_voxel_size(const std::vector<PointCloudView>& clouds,
   if (!suggestion.valid())
     throw InvalidArgument("--voxel-size auto: " + what + ": " + explain(suggestion.reason));
   voxel_size = suggestion.voxel_size;
+}
+
+void MethodOptions::choose_voxel_size(const ScanInput& input, const std::string& journal) {
+  if (!automatic_voxel_size) return;
+  const std::string of_run = PairJournal::setting(journal, "options.prepare.voxel_size");
+  if (!of_run.empty()) {
+    voxel_size = std::strtof(of_run.c_str(), nullptr);
+    return;
+  }
+  constexpr std::size_t kMost = 8;
+  const std::vector<io::ScanFile> scans = input.list(true);
+  const std::size_t count = std::min(scans.size(), kMost);
+  std::vector<PointCloud> clouds;
+  for (std::size_t k = 0; k < count; ++k) try {
+      clouds.push_back(read_cloud(scans[k * scans.size() / count].path, 0, MeshNote::none));
+    } catch (const IoError&) {
+      // One that cannot be read is left out of the run, and named there.
+      if (k + 1 == count && clouds.empty()) throw;
+    }
+  choose_voxel_size(views_of(clouds), input.path);
+}
+
+void MethodOptions::check_sizes(float used, const PreparedSizes& sizes, bool quiet) const {
+  check_voxel_size(used, sizes.extent, "the largest fragment");
+  if (automatic_voxel_size && !quiet) note_few_points(sizes.points);
+  if (!given("--voxel-size") && !quiet) note_unusual_points(voxel_size, sizes.points);
 }
 
 std::string MethodOptions::suggestion_text(const std::vector<PointCloudView>& clouds) const {

@@ -10,6 +10,7 @@
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/point_cloud.hpp"
+#include "inputs/scene.hpp"
 
 namespace gpureg::cli {
 
@@ -52,6 +53,14 @@ struct MethodOptions {
   /// Where no size was given, and --voxel-size auto would be far from the default: a sentence that
   /// says so; empty otherwise.
   std::string suggestion_text(const std::vector<PointCloudView>& clouds) const;
+
+  /// The same by some scans of a folder, evenly chosen; the size of a run that is resumed if it has
+  /// a journal, which says it.
+  void choose_voxel_size(const ScanInput& input, const std::string& journal = "");
+
+  /// Says on stderr what fragments, prepared by this voxel size, show about it, unless quiet.
+  /// @throws InvalidArgument where it is larger than the largest fragment.
+  void check_sizes(float used, const PreparedSizes& sizes, bool quiet) const;
 
   /// Throws BackendUnavailable, InvalidArgument.
   Context context() const;

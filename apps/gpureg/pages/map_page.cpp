@@ -66,13 +66,13 @@ void append16(std::string& bytes, float share) {
 class PagePoints {
  public:
   PagePoints(const MapRun& run, const std::vector<Surface>& surfaces)
-      : boxes_(run.map.islands.size()) {
+      : boxes_(run.made.map.islands.size()) {
     const std::size_t share =
-        std::max(kLeastScanPoints, kPagePoints / std::max<std::size_t>(1, run.map.placed()));
+        std::max(kLeastScanPoints, kPagePoints / std::max<std::size_t>(1, run.made.map.placed()));
     std::vector<std::vector<std::size_t>> kept(surfaces.size());
     spacing_.assign(surfaces.size(), run.options.prepare.voxel_size / 2);
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
-      const reconstruction::Scan& scan = run.map.scans[k];
+      const reconstruction::Scan& scan = run.made.map.scans[k];
       if (!scan.placed) continue;
       of_map_ += surfaces[k].points.size();
       kept[k] = thinned(surfaces[k], share, spacing_[k]);
@@ -87,7 +87,7 @@ class PagePoints {
       first_.push_back(count_);
       counts_.push_back(kept[k].size());
       count_ += kept[k].size();
-      positions_.push_back(append(surfaces[k], kept[k], run.map.scans[k]));
+      positions_.push_back(append(surfaces[k], kept[k], run.made.map.scans[k]));
     }
   }
 
@@ -136,8 +136,8 @@ Json json_of(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z()}; }
 
 Json scans_json(const MapRun& run, const PagePoints& points) {
   Json out = Json::array();
-  for (std::size_t k = 0; k < run.map.scans.size(); ++k) {
-    const reconstruction::Scan& scan = run.map.scans[k];
+  for (std::size_t k = 0; k < run.made.map.scans.size(); ++k) {
+    const reconstruction::Scan& scan = run.made.map.scans[k];
     const bool plain = scan.reason == reconstruction::ScanReason::none;
     out.push_back({{"name", label(run.scene.scans[k])},
                    {"island", scan.placed ? Json(scan.island) : Json(nullptr)},
@@ -153,8 +153,8 @@ Json scans_json(const MapRun& run, const PagePoints& points) {
 
 /// Where a rejected edge would move its source scan, in the island's frame; column by column.
 Json moved_json(const MapRun& run, const Edge& edge) {
-  const reconstruction::Scan &source = run.map.scans[edge.source],
-                             &target = run.map.scans[edge.target];
+  const reconstruction::Scan &source = run.made.map.scans[edge.source],
+                             &target = run.made.map.scans[edge.target];
   if (edge.accepted || !source.placed || !target.placed || source.island != target.island)
     return nullptr;
   const Eigen::Matrix4d moved =
@@ -165,7 +165,7 @@ Json moved_json(const MapRun& run, const Edge& edge) {
 
 Json edges_json(const MapRun& run) {
   Json out = Json::array();
-  for (const Edge& edge : run.map.edges)
+  for (const Edge& edge : run.made.map.edges)
     out.push_back({{"i", edge.target},
                    {"j", edge.source},
                    {"confidence", edge.confidence},
@@ -180,8 +180,8 @@ std::string scans_text(std::size_t count) {
 }
 
 std::string sentence_of(const MapRun& run) {
-  const std::size_t all = run.map.scans.size(), placed = run.map.placed(),
-                    islands = run.map.islands.size();
+  const std::size_t all = run.made.map.scans.size(), placed = run.made.map.placed(),
+                    islands = run.made.map.islands.size();
   if (placed == 0) return "No scan could be placed: no pair is confident enough.";
   std::string text = placed == all ? "All " + scans_text(all) : scans_text(placed);
   text += islands == 1
@@ -197,21 +197,21 @@ Json figures_json(const MapRun& run, const std::vector<reconstruction::Link>& li
   Json weakest = nullptr;
   for (const reconstruction::Link& link : links)
     if (weakest.is_null() || link.confidence < weakest.get<double>()) weakest = link.confidence;
-  const std::size_t placed = run.map.placed();
-  const bool whole = placed == run.map.scans.size() && run.map.islands.size() == 1;
+  const std::size_t placed = run.made.map.placed();
+  const bool whole = placed == run.made.map.scans.size() && run.made.map.islands.size() == 1;
   return {{"sentence", sentence_of(run)},
           {"grade", placed == 0 ? "bad"
                     : whole     ? "good"
                                 : "fair"},
-          {"scans", run.map.scans.size()},
+          {"scans", run.made.map.scans.size()},
           {"placed", placed},
-          {"islands", run.map.islands.size()},
+          {"islands", run.made.map.islands.size()},
           {"accepted", run.accepted_edges()},
-          {"rejected", run.map.edges.size() - run.accepted_edges()},
+          {"rejected", run.made.map.edges.size() - run.accepted_edges()},
           {"weakest", weakest},
           {"points_shown", points.size()},
           {"points", points.of_map()},
-          {"rms", run.refined ? Json(run.refined->final_rmse) : Json(nullptr)}};
+          {"rms", run.made.refinement ? Json(run.made.refinement->final_rmse) : Json(nullptr)}};
 }
 
 Json links_json(std::vector<reconstruction::Link> links) {
@@ -243,12 +243,12 @@ std::string filled(const std::string& page, const std::map<std::string, std::str
 
 }  // namespace
 
-void write_map_page(const MapRun& run, const std::vector<Surface>& surfaces) {
-  const PagePoints points(run, surfaces);
-  const std::vector<reconstruction::Link> links = reconstruction::weakest_links(run.map);
+void write_map_page(const MapRun& run) {
+  const PagePoints points(run, run.made.surfaces);
+  const std::vector<reconstruction::Link> links = reconstruction::weakest_links(run.made.map);
   Json islands = Json::array();
-  for (std::size_t k = 0; k < run.map.islands.size(); ++k)
-    islands.push_back({{"scans", run.map.islands[k].scans.size()},
+  for (std::size_t k = 0; k < run.made.map.islands.size(); ++k)
+    islands.push_back({{"scans", run.made.map.islands[k].scans.size()},
                        {"low", json_of(points.box(k).low)},
                        {"size", points.box(k).size()}});
   const Json data = {{"figures", figures_json(run, links, points)},

@@ -4,8 +4,8 @@
 #include <sstream>
 
 #include "json/json.hpp"
+#include "records/fragments_json.hpp"
 #include "records/result_json.hpp"
-#include "run/pair_run.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {

@@ -5,12 +5,12 @@
 
 #include "gpureg/context.hpp"
 #include "json/json_fwd.hpp"
-#include "run/map_run.hpp"
+#include "records/map_run.hpp"
 
 namespace gpureg::cli {
 
 /// pairs.json without its pairs: what `gpureg report` and `--results` read.
-Json pairs_head(const MapRun& run, const Context& context);
+Json pairs_head(const MapRun& run, const reconstruction::MapOfSet& made, const Context& context);
 
 /// reconstruction.json.
 Json map_document(const MapRun& run, const Context& context);

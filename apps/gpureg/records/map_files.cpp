@@ -46,7 +46,7 @@ std::string poses_text(const MapRun& run, const reconstruction::Island& island) 
   std::string text;
   for (const std::uint32_t k : island.scans) {
     text += std::to_string(run.scene.numbers[k]) + "\n";
-    const Eigen::Matrix4d pose = run.map.scans[k].island_from_scan.matrix();
+    const Eigen::Matrix4d pose = run.made.map.scans[k].island_from_scan.matrix();
     for (int row = 0; row < 4; ++row)
       for (int column = 0; column < 4; ++column) {
         append(text, pose(row, column));
@@ -60,18 +60,18 @@ std::string poses_text(const MapRun& run, const reconstruction::Island& island) 
 evaluation::Trajectory trajectory_of(const MapRun& run, const reconstruction::Island& island) {
   evaluation::Trajectory result;
   for (const std::uint32_t k : island.scans)
-    result.push_back(
-        {static_cast<double>(run.scene.numbers[k]), run.map.scans[k].island_from_scan.matrix()});
+    result.push_back({static_cast<double>(run.scene.numbers[k]),
+                      run.made.map.scans[k].island_from_scan.matrix()});
   return result;
 }
 
 /// The graph of each island.
 std::vector<pose_graph::Graph> graphs_of(const MapRun& run) {
   const std::vector<std::int64_t> ids(run.scene.numbers.begin(), run.scene.numbers.end());
-  pose_graph::Graph all = reconstruction::graph_of(run.map, ids);
-  std::vector<pose_graph::Graph> out(run.map.islands.size());
+  pose_graph::Graph all = reconstruction::graph_of(run.made.map, ids);
+  std::vector<pose_graph::Graph> out(run.made.map.islands.size());
   const auto of = [&](std::int64_t id) -> pose_graph::Graph& {
-    return out[run.map.scans[run.scene.index_of(static_cast<int>(id))].island];
+    return out[run.made.map.scans[run.scene.index_of(static_cast<int>(id))].island];
   };
   for (pose_graph::Node& node : all.nodes) of(node.id).nodes.push_back(std::move(node));
   for (pose_graph::Edge& edge : all.edges) of(edge.source).edges.push_back(std::move(edge));
@@ -81,12 +81,12 @@ std::vector<pose_graph::Graph> graphs_of(const MapRun& run) {
 /// Accepted edges with the poses of the map.
 void write_edges(const MapRun& run) {
   std::vector<evaluation::LogEntry> log;
-  for (const reconstruction::Edge& edge : run.map.edges)
-    if (edge.accepted && run.map.scans[edge.source].placed)
+  for (const reconstruction::Edge& edge : run.made.map.edges)
+    if (edge.accepted && run.made.map.scans[edge.source].placed)
       log.push_back({run.scene.numbers[edge.target], run.scene.numbers[edge.source],
                      run.scene.count(),
-                     (run.map.scans[edge.target].island_from_scan.inverse() *
-                      run.map.scans[edge.source].island_from_scan)
+                     (run.made.map.scans[edge.target].island_from_scan.inverse() *
+                      run.made.map.scans[edge.source].island_from_scan)
                          .matrix()});
   evaluation::write_log(run.file("edges.log"), log);
 }
@@ -119,7 +119,7 @@ std::vector<std::string> map_files_in(const std::string& folder) {
 void write_poses(const MapRun& run) {
   const std::vector<pose_graph::Graph> graphs = graphs_of(run);
   for (std::size_t k = 0; k < graphs.size(); ++k) {
-    const reconstruction::Island& island = run.map.islands[k];
+    const reconstruction::Island& island = run.made.map.islands[k];
     files::write_atomically(run.file(file_of_island("poses.txt", k)), poses_text(run, island));
     evaluation::write_trajectory(run.file(file_of_island("trajectory.txt", k)),
                                  trajectory_of(run, island));
@@ -131,15 +131,15 @@ void write_poses(const MapRun& run) {
 
 /// One map per island, one scan in memory at a time.
 bool write_merged_maps(MapRun& run, float voxel_size, bool quiet) {
-  Progress progress("merging", "scans", run.map.placed(), quiet);
+  Progress progress("merging", "scans", run.made.map.placed(), quiet);
   std::size_t merged = 0;
-  for (std::size_t k = 0; k < run.map.islands.size(); ++k) {
+  for (std::size_t k = 0; k < run.made.map.islands.size(); ++k) {
     reconstruction::VoxelMap map(voxel_size);
-    for (const std::uint32_t scan : run.map.islands[k].scans) {
+    for (const std::uint32_t scan : run.made.map.islands[k].scans) {
       if (InterruptGuard::requested()) return false;
       const PointCloud cloud =
           read_cloud(run.scene.scans[scan].path, mesh_spacing(voxel_size), MeshNote::none);
-      map.add(cloud.view(), run.map.scans[scan].island_from_scan);
+      map.add(cloud.view(), run.made.map.scans[scan].island_from_scan);
       progress.update(++merged);
     }
     run.map_points += map.size();

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "run/map_run.hpp"
+#include "records/map_run.hpp"
 
 namespace gpureg::cli {
 

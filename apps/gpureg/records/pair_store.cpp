@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "records/pair_store.hpp"
 
-#include <algorithm>
+#include <cstdlib>
 
 #include "gpureg/error.hpp"
+#include "gpureg/sets/pair_journal.hpp"
 #include "json/json_fields.hpp"
 #include "json/json_file.hpp"
 #include "records/pair_json.hpp"
@@ -15,38 +16,29 @@ namespace gpureg::cli {
 namespace {
 
 /// Tolerances belong to the voxel size of the results.
-void check_voxel_size_of(const Json& document, const std::string& path, float expected) {
-  const Json::json_pointer place("/options/prepare/voxel_size");
-  if (!document.contains(place) || !document[place].is_number()) return;
-  const auto voxel_size = document[place].get<float>();
+void check_voxel_size_of(float voxel_size, const std::string& path, float expected) {
   if (voxel_size != expected)
     throw InvalidArgument("--voxel-size is " + significant(static_cast<double>(expected), 4) +
                           ", but " + path + " was made with " +
                           significant(static_cast<double>(voxel_size), 4));
 }
 
+std::uint32_t index_of_name(const FragmentFolder& folder, const std::string& name) {
+  for (std::size_t k = 0; k < folder.scans.size(); ++k)
+    if (folder.scans[k].name == name) return static_cast<std::uint32_t>(k);
+  throw InvalidArgument("it names " + name + ", which the folder lacks");
+}
+
 /// Of a document whose pairs have names, these tell which scan a number is.
 std::uint32_t index_of(const FragmentFolder& folder, const Json& pair, const char* number_name,
                        const char* name_name) {
   const int number = fragment_member(pair, number_name);
-  if (const auto name = pair.find(name_name); name != pair.end() && name->is_string()) {
-    const auto text = name->get<std::string>();
-    for (std::size_t k = 0; k < folder.scans.size(); ++k)
-      if (folder.scans[k].name == text) return static_cast<std::uint32_t>(k);
-    throw InvalidArgument("it names " + text + ", which the folder lacks");
-  }
+  if (const auto name = pair.find(name_name); name != pair.end() && name->is_string())
+    return index_of_name(folder, name->get<std::string>());
   if (!folder.has(number))
     throw InvalidArgument("it names fragment " + std::to_string(number) +
                           ", which the folder lacks");
   return folder.index_of(number);
-}
-
-bool is_unusable(const FragmentFolder& folder, const Json& pair, int number,
-                 const char* name_name) {
-  const auto name = pair.find(name_name);
-  if (name == pair.end() || !name->is_string()) return folder.is_unusable(number);
-  return std::any_of(folder.unusable.begin(), folder.unusable.end(),
-                     [&](const UnusableFragment& scan) { return scan.scan.name == *name; });
 }
 
 RegistrationResult stored_result(const Json& json) {
@@ -57,54 +49,62 @@ RegistrationResult stored_result(const Json& json) {
   return result;
 }
 
-}  // namespace
-
-std::vector<std::size_t> PairStore::all_done() const {
-  std::vector<std::size_t> places;
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    if (done(k)) places.push_back(k);
-  return places;
+StoredPairs read_pairs_of_journal(const std::string& path, const FragmentFolder& folder,
+                                  float voxel_size) {
+  JournalContents journal = read_journal(path);
+  for (const auto& [name, value] : journal.settings)
+    if (name == "options.prepare.voxel_size")
+      check_voxel_size_of(std::strtof(value.c_str(), nullptr), path, voxel_size);
+  StoredPairs out{{}, std::move(journal.results)};
+  try {
+    for (const Pair& pair : journal.pairs)
+      out.pairs.push_back({index_of_name(folder, journal.clouds[pair.source].name),
+                           index_of_name(folder, journal.clouds[pair.target].name)});
+  } catch (const InvalidArgument& error) {
+    throw IoError(path + ": " + error.what());
+  }
+  return out;
 }
 
-void write_pairs(const std::string& path, const Json& head, const PairStore& store,
+}  // namespace
+
+void write_pairs(const std::string& path, const Json& head, const std::vector<Pair>& pairs,
+                 const std::function<RegistrationResult(std::size_t)>& result,
                  const FragmentFolder& folder, bool with_information) {
-  const std::vector<std::size_t> places = store.all_done();
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    if (result(k).status != RegistrationStatus::skipped) places.push_back(k);
   const auto element = [&](std::size_t n) {
-    const Pair& pair = store.pairs[places[n]];
-    const RegistrationResult& result = store.results[places[n]];
+    const Pair& pair = pairs[places[n]];
+    const RegistrationResult done = result(places[n]);
     const io::ScanFile &i = folder.scans[pair.target], &j = folder.scans[pair.source];
     Json json = {{"i", i.number}, {"j", j.number}, {"name_i", i.name}, {"name_j", j.name}};
-    json.update(pair_to_json(i.number, j.number, result));
-    if (with_information && result.has_candidate)
-      json["information"] = to_json(result.source_moments.information_redwood());
+    json.update(pair_to_json(i.number, j.number, done));
+    if (with_information && done.has_candidate)
+      json["information"] = to_json(done.source_moments.information_redwood());
     return json;
   };
   write_document(path, head, {"pairs", places.size(), element});
 }
 
-PairStore read_pairs(const std::string& path, const FragmentFolder& folder, float voxel_size) {
+StoredPairs read_pairs(const std::string& path, const FragmentFolder& folder, float voxel_size) {
+  if (is_journal(path)) return read_pairs_of_journal(path, folder, voxel_size);
   DocumentFile file(path);
-  PairStore store;
-  const Json document = read_pairs(file, [&](const PairRecord& pair, Json&& json) {
-    if (is_unusable(folder, json, pair.i, "name_i") || is_unusable(folder, json, pair.j, "name_j"))
-      return;
-    store.pairs.push_back(
+  StoredPairs out;
+  const Json document = read_pairs(file, [&](const PairRecord&, Json&& json) {
+    out.pairs.push_back(
         {index_of(folder, json, "j", "name_j"), index_of(folder, json, "i", "name_i")});
-    store.results.push_back(stored_result(json));
+    out.results.push_back(stored_result(json));
   });
   if (document.contains("loop_consistency"))
     throw IoError(path +
                   ": its scores are those of `gpureg consistency`; give the JSON of the batch");
   if (document.contains("complete") && document["complete"] == false)
     throw IoError(path + ": is of an unfinished batch");
-  check_voxel_size_of(document, path, voxel_size);
-  return store;
-}
-
-void reduce_moments(RegistrationResult& result) {
-  result.source_moments =
-      CorrespondenceMoments::from_redwood(result.source_moments.information_redwood());
-  result.target_moments = {};
+  const Json::json_pointer place("/options/prepare/voxel_size");
+  if (document.contains(place) && document[place].is_number())
+    check_voxel_size_of(document[place].get<float>(), path, voxel_size);
+  return out;
 }
 
 }  // namespace gpureg::cli

@@ -6,22 +6,6 @@
 #include "text.hpp"
 
 namespace gpureg::cli {
-namespace {
-
-/// Without these ascending rows.
-void remove_rows(const std::vector<std::uint32_t>& rows, std::vector<Eigen::Vector3f>& values) {
-  if (values.empty()) return;
-  std::size_t next = 0, kept = 0;
-  for (std::size_t k = 0; k < values.size(); ++k)
-    if (next < rows.size() && rows[next] == k)
-      ++next;
-    else
-      values[kept++] = values[k];
-  values.resize(kept);
-}
-
-}  // namespace
-
 std::string at_range_limits(std::uint64_t points, double smallest, double largest) {
   if (points == 0) return "";
   std::string where;
@@ -51,24 +35,10 @@ std::string SensorFixedNote::Most::line() const {
          ")";
 }
 
-void SensorFixedNote::leave_out_parts(std::vector<PointCloud>& clouds,
-                                      const std::vector<std::string>& files, bool infer_viewpoint) {
-  std::vector<PointCloudView> views;
-  for (const PointCloud& cloud : clouds) {
-    views.push_back(cloud.view());
-    views.back().infer_viewpoint = infer_viewpoint || !cloud.viewpoints.empty();
-  }
-  if (!parts_) parts_ = find_fixed_parts(views);
-  for (std::size_t k = 0; k < clouds.size(); ++k) {
-    const std::vector<std::uint32_t> rows = rows_in(*parts_, views[k]);
-    if (rows.empty()) continue;
-    in_parts_.see(rows.size(), clouds[k].points.size(), grouped(rows.size()) + " points", files[k]);
-    remove_rows(rows, clouds[k].points);
-    remove_rows(rows, clouds[k].normals);
-  }
-}
-
-void SensorFixedNote::see(const PrepareStatistics& s, const std::string& file) {
+void SensorFixedNote::see(const PreparedFragment& fragment, const std::string& file) {
+  const PrepareStatistics& s = fragment.cloud.statistics();
+  in_parts_.see(fragment.fixed_points, s.input_points + fragment.fixed_points,
+                grouped(fragment.fixed_points) + " points", file);
   at_limits_.see(s.range_limit_points, s.input_points,
                  at_range_limits(s.range_limit_points, s.smallest_range, s.largest_range), file);
 }

@@ -22,7 +22,6 @@
 #include "records/map_files.hpp"
 #include "records/scan_table.hpp"
 #include "run/interrupt.hpp"
-#include "run/pair_run.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -191,7 +190,7 @@ void add_audit(CommandLine& line) {
     o->method.refuse({"--min-score"}, "in an audit: connections have verdicts of their own");
     if (o->mended.empty())
       o->method.refuse({"--seed", "--quality"}, "without --mend: no pair is aligned");
-    choose_voxel_size(o->method, o->input);
+    o->method.choose_voxel_size(o->input);
     return run_audit(*o);
   });
 }

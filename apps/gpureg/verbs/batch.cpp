@@ -12,19 +12,20 @@
 #include "command.hpp"
 #include "gpureg/evaluation.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/sets/register_all.hpp"
 #include "inputs/scene.hpp"
 #include "json/fields_json.hpp"
 #include "json/json.hpp"
 #include "options/knowledge_options.hpp"
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
-#include "records/journal.hpp"
+#include "options/resume_options.hpp"
+#include "records/fragments_json.hpp"
 #include "records/pair_store.hpp"
 #include "records/result_json.hpp"
 #include "records/scan_table.hpp"
 #include "run/interrupt.hpp"
-#include "run/pair_run.hpp"
-#include "run/spacing.hpp"
+#include "run/progress.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -37,13 +38,10 @@ struct BatchOptions {
   ViewpointChoice viewpoint;  // of clouds without cameras: auto or none
   std::string up;
   std::string log, info, json;
-  bool resume = false, restart = false, quiet = false;
+  ResumeOptions resume;
+  bool quiet = false;
 
   std::string journal() const { return log + ".journal"; }
-  Journal::Mode journal_mode() const {
-    if (resume) return Journal::Mode::resume;
-    return restart ? Journal::Mode::restart : Journal::Mode::fresh;
-  }
 };
 
 // A device or pipe (/dev/stdout, say) has no place beside it.
@@ -67,9 +65,9 @@ class Batch {
       : o_(o), options_(o.method.registration()), context_(o.method.context()) {}
 
   int run() {
-    if (o_.resume && !can_have_journal(o_.log))
+    if (o_.resume.resume && !can_have_journal(o_.log))
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
-    if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
+    if (can_have_journal(o_.log)) o_.resume.check(o_.journal());
     const InterruptGuard guard;
     scene_ =
         prepare_folder(context_, o_.input, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
@@ -77,49 +75,67 @@ class Batch {
       std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
       return kInterrupted;
     }
-    check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
-    if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
-    if (!o_.method.given("--voxel-size") && !o_.quiet)
-      note_unusual_points(o_.method.voxel_size, scene_.prepared_sizes());
-    const Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
+    o_.method.check_sizes(options_.prepare.voxel_size, scene_.sizes, o_.quiet);
+    const std::vector<Pair> pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.input.path + " holds one scan, " + scene_.scans[0].name +
                             "; a batch needs two");
-    std::optional<std::string> journal;
-    if (can_have_journal(o_.log)) journal = o_.journal();
-    run_.emplace(scene_, pairs, options_, up_prior(o_.up), journal, o_.journal_mode(), o_.quiet);
+    open_journal(pairs);
     keep_outputs();
-    run_->align(context_);
-    if (!run_->complete() && run_->journal() && kept_.empty()) run_->journal()->note_outputs();
+    align();
+    if (!complete() && kept_.empty()) journal_->set_note(kOutputsWritten);
     write_outputs();
-    if (!run_->complete()) return say_interrupted();
-    run_->close_journal();
+    if (!complete()) return say_interrupted();
+    o_.resume.close(*journal_, scene_, o_.quiet);
     return summarise();
   }
 
  private:
+  bool complete() const { return journal_->done() == journal_->size(); }
+
+  void open_journal(const std::vector<Pair>& pairs) {
+    const std::string path = can_have_journal(o_.log) ? o_.journal() : "";
+    RunIdentity run = scene_.identity;
+    run.settings = RunIdentity::settings_of(options_, up_prior(o_.up));
+    o_.resume.with(path, [&] { journal_.emplace(path, run, pairs, o_.resume.mode()); });
+    if (!o_.quiet) o_.resume.tell(path, journal_->resumed(), journal_->size());
+  }
+
+  void align() {
+    Progress progress("aligning", "pairs", journal_->size(), o_.quiet, journal_->done());
+    register_all(context_, scene_.clouds, *journal_, options_, up_prior(o_.up),
+                 {[&](std::size_t done) { progress.update(done); }, InterruptGuard::requested});
+    seconds_ = progress.seconds();
+  }
+
+  std::size_t in_this_run() const { return journal_->done() - journal_->resumed(); }
+  double rate() const {  // pairs per second
+    return seconds_ > 0 ? static_cast<double>(in_this_run()) / seconds_ : 0;
+  }
+
   /// Only a complete run replaces the outputs of another run; an interrupted run keeps its own.
   void keep_outputs() {
-    if (run_->journal() && run_->journal()->wrote_outputs()) return;
+    if (journal_->note() == kOutputsWritten) return;
     for (const std::string& path : {o_.log, o_.info, o_.json})
       if (std::filesystem::is_regular_file(path)) kept_.insert(path);
   }
   /// A log has numbers alone.
   bool has_table() const { return can_have_journal(o_.log) && !are_numbered(scene_.all()); }
   bool may_write(const std::string& path) const {
-    return !path.empty() && (run_->complete() || kept_.count(path) == 0);
+    return !path.empty() && (complete() || kept_.count(path) == 0);
   }
 
   void write_outputs() {
     std::vector<evaluation::LogEntry> log;
     std::vector<evaluation::InformationEntry> information;
-    for (const std::size_t k : run_->store().all_done()) {
-      const RegistrationResult& result = run_->store().results[k];
+    for (std::size_t k = 0; k < journal_->size(); ++k) {
+      if (!journal_->done(k)) continue;
+      const RegistrationResult result = journal_->result(k);
       if (!result.aligned()) {
         ++reasons_[to_string(result.reason)];
         continue;
       }
-      const Pair& pair = run_->store().pairs[k];
+      const Pair& pair = journal_->pairs()[k];
       const int i = scene_.numbers[pair.target], j = scene_.numbers[pair.source];
       log.push_back({i, j, scene_.count(), result.target_from_source.matrix()});
       information.push_back({i, j, scene_.count(), result.source_moments.information_redwood()});
@@ -128,7 +144,10 @@ class Batch {
     if (may_write(o_.log)) evaluation::write_log(o_.log, log);
     if (may_write(o_.log) && has_table()) write_scan_table(scan_table_of(o_.log), scene_.all());
     if (may_write(o_.info)) evaluation::write_information(o_.info, information);
-    if (may_write(o_.json)) write_pairs(o_.json, head(), run_->store(), scene_, false);
+    if (may_write(o_.json))
+      write_pairs(
+          o_.json, head(), journal_->pairs(), [&](std::size_t k) { return journal_->result(k); },
+          scene_, false);
   }
 
   /// RESULT.json without its pairs.
@@ -139,13 +158,13 @@ class Batch {
     json["options"] = to_json(options_);
     json["folder"] = o_.input.path;
     json["recursive"] = o_.input.recursive;
-    json["complete"] = run_->complete();
+    json["complete"] = complete();
     json["seconds"] = {{"prepare", scene_.seconds},
-                       {"align", run_->seconds()},
-                       {"pairs_per_second", run_->rate()},
-                       {"pairs_in_this_run", run_->in_this_run()}};
+                       {"align", seconds_},
+                       {"pairs_per_second", rate()},
+                       {"pairs_in_this_run", in_this_run()}};
     json["peak_memory_mib"] = peak_memory_mib();
-    json["fragments"] = fragments_json(scene_);
+    json["fragments"] = fragments_json(scene_, scene_.clouds);
     json["unusable"] = unusable_json(scene_);
     return json;
   }
@@ -153,7 +172,7 @@ class Batch {
   int say_interrupted() const {
     std::string kept;
     for (const std::string& path : kept_) kept += (kept.empty() ? "" : ", ") + path;
-    std::cerr << "gpureg: interrupted, " << run_->done() << " of " << run_->size()
+    std::cerr << "gpureg: interrupted, " << journal_->done() << " of " << journal_->size()
               << " pairs are done and written"
               << (kept.empty() ? "" : " to the journal, " + kept + " left as before")
               << "; go on with the same command and --resume" << std::endl;
@@ -167,14 +186,15 @@ class Batch {
                   << "\n";
       std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
                 << fixed(scene_.seconds, 2) << " s\n"
-                << unusable_line(scene_) << "pairs      " << run_->size() << ", in "
-                << fixed(run_->seconds(), 2) << " s (" << significant(run_->rate(), 3)
-                << " pairs/s, " << context_.description() << ")\n"
+                << unusable_line(scene_) << "pairs      " << journal_->size() << ", in "
+                << fixed(seconds_, 2) << " s (" << significant(rate(), 3) << " pairs/s, "
+                << context_.description() << ")\n"
                 << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
       if (has_table())
         std::cout << "names      of the numbers in the log: " << scan_table_of(o_.log) << "\n";
       if (!reasons_.empty())
-        std::cout << "not        " << run_->done() - aligned_ << ": " << counted(reasons_) << "\n";
+        std::cout << "not        " << journal_->done() - aligned_ << ": " << counted(reasons_)
+                  << "\n";
       std::cout << "memory     " << fixed(peak_memory_mib(), 0) << " MiB at most\n";
     }
     if (!scene_.unusable.empty()) return kIncomplete;
@@ -185,7 +205,8 @@ class Batch {
   RegistrationOptions options_;
   Context context_;
   PreparedFolder scene_;
-  std::optional<PairRun> run_;
+  std::optional<PairJournal> journal_;
+  double seconds_ = 0;          // of the alignment
   std::set<std::string> kept_;  // outputs of another run
   std::size_t aligned_ = 0;
   std::map<std::string, std::size_t> reasons_;
@@ -216,17 +237,14 @@ void add_batch(CommandLine& line) {
       .required();
   verb.option("--info", o->info, "Redwood information matrices of the same pairs");
   verb.option("--json", o->json, "Everything about every pair tried");
-  const Option resume =
-      verb.flag("--resume", o->resume, "Go on where an interrupted run of this output stopped");
-  verb.flag("--restart", o->restart, "Discard what an interrupted run of this output did")
-      .excludes(resume);
+  o->resume.add_to(verb);
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] {
     o->method.registration();  // reports bad options before the clouds are read
     up_prior(o->up);
     check_batch_outputs(*o);
     check_pairs(o->input, o->pairs);
-    choose_voxel_size(o->method, o->input, o->resume ? o->journal() : "");
+    o->method.choose_voxel_size(o->input, o->resume.resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Batch(*o).run();
   });

@@ -19,7 +19,6 @@
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
 #include "run/interrupt.hpp"
-#include "run/pair_run.hpp"
 #include "run/progress.hpp"
 #include "run/spacing.hpp"
 #include "run/viewpoint_note.hpp"
@@ -148,7 +147,7 @@ int run(CalibrateOptions o) {
   const FragmentFolder folder(o.input, true);
   std::vector<UnalignedIsometry3d> poses;
   if (!o.trajectory.empty()) poses = read_scan_poses(o.trajectory, folder.scans, o.input.path);
-  choose_voxel_size(o.method, o.input);
+  o.method.choose_voxel_size(o.input);
   const RegistrationOptions options = o.method.registration();
   for (const SceneFile& scene : scenes) check_options(scene, scene_options(options));
   const InterruptGuard guard;

@@ -9,6 +9,7 @@
 #include "command.hpp"
 #include "gpureg/context.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/preparation/sensor_fixed.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "inputs/cloud_file.hpp"
 #include "options/output_path.hpp"

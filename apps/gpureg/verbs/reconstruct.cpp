@@ -11,20 +11,19 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/pruning.hpp"
-#include "inputs/cloud_file.hpp"
+#include "gpureg/reconstruction/reconstruct.hpp"
 #include "inputs/odometry_file.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
+#include "options/method_options.hpp"
 #include "options/output_path.hpp"
+#include "options/resume_options.hpp"
 #include "pages/map_page.hpp"
 #include "records/map_document.hpp"
 #include "records/map_files.hpp"
 #include "records/pair_store.hpp"
 #include "run/interrupt.hpp"
-#include "run/pair_run.hpp"
 #include "run/progress.hpp"
-#include "run/spacing.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -42,14 +41,11 @@ struct ReconstructOptions {
   pose_graph::DriftOptions drift;
   std::optional<float> map_voxel_size;
   bool no_refine = false, no_map = false, no_audit = false;
-  bool resume = false, restart = false, quiet = false;
+  ResumeOptions resume;
+  bool quiet = false;
 
   std::string file(const std::string& name) const { return (fs::path(output) / name).string(); }
   std::string journal() const { return file(kJournal); }
-  Journal::Mode journal_mode() const {
-    if (resume) return Journal::Mode::resume;
-    return restart ? Journal::Mode::restart : Journal::Mode::fresh;
-  }
 };
 
 /// Makes the output folder, and refuses one whose files could be inputs.
@@ -83,51 +79,62 @@ void check_output_folder(const ReconstructOptions& o) {
   check_outputs(outputs, inputs);
 }
 
-/// A bad file shall show before the clouds are read.
-void check_inputs(const ReconstructOptions& o) {
-  check_pairs(o.input, o.pairs);
-  if (o.odometry.empty()) return;
-  read_odometry(o.odometry, FragmentFolder(o.input, true).scans, o.input.path);
-}
+/// Progress of each step of the library on stderr.
+class StepProgress {
+ public:
+  explicit StepProgress(bool quiet) : quiet_(quiet) {}
+
+  void update(reconstruction::MapStep step, std::size_t done, std::size_t total) {
+    static constexpr const char* kLabels[] = {"preparing", "aligning", "preparing finer",
+                                              "refining"};
+    static constexpr const char* kUnits[] = {"fragments", "pairs", "fragments", "iterations"};
+    if (!progress_ || step != step_) {
+      step_ = step;
+      progress_.reset();  // its last state stays on the screen above the next
+      const auto k = static_cast<std::size_t>(step);
+      progress_.emplace(kLabels[k], kUnits[k], total, quiet_, done);
+    }
+    progress_->update(done);
+    if (done >= total) progress_.reset();
+  }
+  void end() { progress_.reset(); }
+
+ private:
+  bool quiet_;
+  reconstruction::MapStep step_{};
+  std::optional<Progress> progress_;
+};
 
 /// One run, from the folder to the map.
 class Reconstruct {
  public:
-  explicit Reconstruct(const ReconstructOptions& o) : o_(o), context_(o.method.context()) {
+  explicit Reconstruct(const ReconstructOptions& o)
+      : o_(o),
+        context_(o.method.context()),
+        set_(FragmentFolder(o.input, o.quiet), o.quiet),
+        progress_(o.quiet) {
     run_.input = o.input;
     run_.output = o.output;
     run_.options = o.method.registration();
+    run_.scene = set_.folder();
+    run_.aligned_here = o.results.empty();
   }
 
   int run() {
-    if (o_.results.empty()) Journal::check(o_.journal(), o_.journal_mode());
+    if (run_.aligned_here) o_.resume.check(o_.journal());
     const InterruptGuard guard;
-    if (o_.results.empty()) {
-      if (!align_pairs()) return say_interrupted();
-    } else {
-      run_.scene = PreparedFolder(FragmentFolder(o_.input, o_.quiet));
-      run_.pairs = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
-      if (!o_.no_audit) {
-        PreparedFolder scene = prepare_folder(context_, o_.input, run_.options.prepare, o_.quiet);
-        if (scene.interrupted) return say_interrupted();
-        run_.seconds.prepare = scene.seconds;
-        run_.scene = std::move(scene);
-      } else if (!(o_.no_refine && o_.no_map)) {
-        run_.scene.leave_out_unreadable();
-      }
-      if (!run_.scene.unusable.empty())
-        run_.pairs = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
+    const reconstruction::MapInput known = input();
+    const reconstruction::MapOptions map_options = options();
+    try {
+      o_.resume.with(o_.journal(), [&] {
+        run_.made = reconstruction::reconstruct(context_, set_, known, map_options, callbacks());
+      });
+    } catch (const reconstruction::Cancelled&) {
+      return say_interrupted();
     }
-    if (!o_.odometry.empty() && odometry_.empty()) odometry_ = known_poses();
-    if (!reconstruct()) return say_interrupted();
-    if (!(o_.no_refine && o_.no_map)) {
-      const Clock::time_point start = Clock::now();
-      if (!make_surfaces()) return say_interrupted();
-      run_.seconds.surfaces = since(start);
-    }
-    if (!o_.no_refine && !refine()) return say_interrupted();
+    progress_.end();
     if (!write_outputs()) return say_interrupted();
-    if (pairs_) pairs_->close_journal();
+    if (run_.made.journal) ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
     if (!o_.quiet) {
       if (o_.method.automatic_voxel_size)
         std::cout << "voxel size " << significant(static_cast<double>(o_.method.voxel_size), 3)
@@ -135,68 +142,69 @@ class Reconstruct {
       std::cout << map_summary(run_, context_);
     }
     if (!run_.scene.unusable.empty()) return kIncomplete;
-    return run_.map.islands.empty() ? kNoAlignment : kOk;
+    return run_.made.map.islands.empty() ? kNoAlignment : kOk;
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-  static double since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
+  reconstruction::MapInput input() const {
+    reconstruction::MapInput known;
+    if (!o_.odometry.empty()) known = read_odometry(o_.odometry, run_.scene.scans, o_.input.path);
+    if (!o_.results.empty()) {
+      StoredPairs stored = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
+      known.pairs = std::move(stored.pairs);
+      known.results = std::move(stored.results);
+    } else if (o_.prune == 0) {
+      known.pairs = choose_pairs(run_.scene, o_.pairs, o_.quiet);
+      if (known.pairs->empty())
+        throw InvalidArgument(o_.input.path + " holds one scan, " + run_.scene.scans[0].name +
+                              "; a map needs two");
+    }
+    return known;
   }
 
-  /// Prepares and aligns. false: interrupted.
-  bool align_pairs() {
-    PreparedFolder& scene = run_.scene;
-    scene = prepare_folder(context_, o_.input, run_.options.prepare, o_.quiet);
-    if (scene.interrupted) return false;
-    run_.seconds.prepare = scene.seconds;
-    check_voxel_size(run_.options.prepare.voxel_size, scene.extent, "the largest fragment");
-    if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene.prepared_sizes());
-    if (!o_.method.given("--voxel-size") && !o_.quiet)
-      note_unusual_points(o_.method.voxel_size, scene.prepared_sizes());
-    // A bad file shall show before hours of work.
-    if (!o_.odometry.empty()) odometry_ = known_poses();
-    const Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
-    if (pairs.empty())
-      throw InvalidArgument(o_.input.path + " holds one scan, " + scene.scans[0].name +
-                            "; a map needs two");
-    pairs_.emplace(scene, pairs, run_.options, std::nullopt, o_.journal(), o_.journal_mode(),
-                   o_.quiet);
-    pairs_->align(context_);
-    if (!pairs_->complete()) return false;
-    run_.pairs = pairs_->take_store();
-    run_.aligned_here = true;
-    run_.seconds.align = pairs_->seconds();
-    run_.pairs_in_this_run = pairs_->in_this_run();
-    clear_output();
-    // The work of hours is safe from here on, whatever becomes of the map.
-    write_pairs(o_.file("pairs.json"), pairs_head(run_, context_), run_.pairs, scene, true);
-    for (RegistrationResult& result : run_.pairs.results) reduce_moments(result);
-    return true;
+  reconstruction::MapOptions options() const {
+    auto options = reconstruction::MapOptions::of(run_.options);
+    options.graph.threads = static_cast<int>(o_.method.threads);
+    options.graph.drift = o_.drift;
+    options.with_audit = !o_.no_audit;
+    options.with_refinement = !o_.no_refine;
+    options.with_surfaces = !o_.no_map;
+    options.prune = o_.prune;
+    options.journal = o_.journal();
+    options.journal_mode = o_.resume.mode();
+    return options;
   }
 
-  std::vector<reconstruction::Odometry> known_poses() const {
-    std::vector<int> unusable;
-    for (const UnusableFragment& fragment : run_.scene.unusable)
-      unusable.push_back(fragment.scan.number);
-    return read_odometry(o_.odometry, run_.scene.scans, o_.input.path, unusable);
-  }
-
-  /// The pairs of --prune, and of consecutive scans where odometry knows them.
-  Pairs likely_pairs() {
-    const Clock::time_point start = Clock::now();
-    pruning::Options options;
-    options.neighbors = o_.prune;
-    options.threads = static_cast<int>(o_.method.threads);
-    Pairs pairs;
-    for (const Pair& pair : pruning::likely_pairs(run_.scene.clouds, options))
-      pairs.emplace_back(pair.target, pair.source);
-    for (const reconstruction::Odometry& edge : odometry_)
-      pairs.push_back(std::minmax(edge.source, edge.target));
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-    run_.seconds.prune = since(start);
-    return pairs;
+  reconstruction::MapCallbacks callbacks() {
+    using reconstruction::MapOfSet;
+    reconstruction::MapCallbacks callbacks;
+    callbacks.should_stop = InterruptGuard::requested;
+    callbacks.on_progress = [this](reconstruction::MapStep step, std::size_t done,
+                                   std::size_t total) {
+      if (step == reconstruction::MapStep::align) {
+        if (!pairs_ && !o_.quiet) o_.resume.tell(o_.journal(), done, total);
+        pairs_ = {done, total};
+      }
+      progress_.update(step, done, total);
+    };
+    callbacks.on_prepared = [this](const MapOfSet& made) {
+      progress_.end();
+      set_.print_notes(made.scans, made.prepared);
+      run_.scene.leave_out(made.unusable);
+      if (run_.aligned_here)
+        o_.method.check_sizes(run_.options.prepare.voxel_size,
+                              sizes_of(set_, made.scans, made.prepared), o_.quiet);
+    };
+    callbacks.on_aligned = [this](const MapOfSet& made) {
+      progress_.end();
+      if (!run_.aligned_here) return;
+      clear_output();
+      // The work of hours is safe from here on, whatever becomes of the map.
+      write_pairs(
+          o_.file("pairs.json"), pairs_head(run_, made, context_), made.pairs,
+          [&](std::size_t k) { return made.results[k]; }, run_.scene, true);
+    };
+    return callbacks;
   }
 
   /// Removes the map of an earlier run. A folder without reconstruction.json, which is written
@@ -215,89 +223,28 @@ class Reconstruct {
   }
 
   /// false: interrupted.
-  bool reconstruct() {
-    const Clock::time_point start = Clock::now();
-    auto options = reconstruction::Options::from_voxel_size(run_.options.prepare.voxel_size);
-    options.threads = static_cast<int>(o_.method.threads);
-    options.drift = o_.drift;
-    if (o_.no_audit) {
-      run_.map = reconstruction::reconstruct_from_poses(run_.scene.numbers.size(), run_.pairs.pairs,
-                                                        run_.pairs.results, options, odometry_);
-    } else {
-      const float voxel_size = run_.options.prepare.voxel_size;
-      auto audit = reconstruction::AuditOptions::from_voxel_size(voxel_size);
-      audit.should_stop = InterruptGuard::requested;
-      reconstruction::AuditedReconstruction audited;
-      try {
-        audited = reconstruction::reconstruct(context_, run_.scene.clouds, run_.pairs.pairs,
-                                              run_.pairs.results, options, odometry_, run_.options,
-                                              audit);
-      } catch (const reconstruction::Cancelled&) {
-        return false;
-      }
-      run_.map = std::move(audited.map);
-      run_.audit = std::move(audited.audit);
-      run_.places_look_alike = audited.places_look_alike;
-    }
-    run_.seconds.graph = since(start);
-    return !InterruptGuard::requested();
-  }
-
-  /// Points and normals of the placed scans. false: interrupted.
-  bool make_surfaces() {
-    const PreparedFolder& scene = run_.scene;
-    surfaces_.resize(scene.numbers.size());
-    Progress progress("preparing finer", "fragments", surfaces_.size(), o_.quiet);
-    for (std::size_t k = 0; k < surfaces_.size(); ++k) {
-      if (InterruptGuard::requested()) return false;
-      if (run_.map.scans[k].placed) {
-        const PointCloud cloud =
-            scene.read(k, mesh_spacing(run_.options.prepare.voxel_size), MeshNote::none);
-        surfaces_[k] = reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
-      }
-      progress.update(k + 1);
-    }
-    return true;
-  }
-
-  /// false: interrupted.
-  bool refine() {
-    const Clock::time_point start = Clock::now();
-    auto options =
-        reconstruction::RefineOptions::for_depth_cameras(run_.options.prepare.voxel_size);
-    options.threads = static_cast<int>(o_.method.threads);
-    Progress iterations("refining", "iterations", static_cast<std::size_t>(options.iterations),
-                        o_.quiet);
-    options.should_stop = [&](int k) {
-      iterations.update(static_cast<std::size_t>(k));
-      return InterruptGuard::requested();
-    };
-    run_.refined = reconstruction::refine(context_, surfaces_, run_.map, options);
-    run_.seconds.refine = since(start);
-    return !InterruptGuard::requested();
-  }
-
-  /// false: interrupted.
   bool write_outputs() {
-    const Clock::time_point start = Clock::now();
+    const auto start = std::chrono::steady_clock::now();
     if (!run_.aligned_here) clear_output();
     write_poses(run_);
     if (!o_.no_map) {
       const float voxel_size =
           o_.map_voxel_size.value_or(static_cast<float>(o_.method.voxel_size / 2));
       if (!write_merged_maps(run_, voxel_size, o_.quiet)) return false;
-      write_map_page(run_, surfaces_);
+      write_map_page(run_);
     }
-    run_.seconds.write = since(start);
+    run_.seconds_of_writing =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (InterruptGuard::requested()) return false;
     write_document(o_.file("reconstruction.json"), map_document(run_, context_));
     return true;
   }
 
-  int say_interrupted() const {
+  int say_interrupted() {
+    progress_.end();
     std::cerr << "gpureg: interrupted";
     if (pairs_)
-      std::cerr << ", " << pairs_->done() << " of " << pairs_->size()
+      std::cerr << ", " << pairs_->first << " of " << pairs_->second
                 << " pairs are in the journal; go on with the same command and --resume";
     else
       std::cerr << ", no map written";
@@ -307,10 +254,10 @@ class Reconstruct {
 
   const ReconstructOptions& o_;
   Context context_;
+  FolderSet set_;
   MapRun run_;
-  std::optional<PairRun> pairs_;  // none: the results come from a file
-  std::vector<reconstruction::Odometry> odometry_;
-  std::vector<reconstruction::Surface> surfaces_;
+  StepProgress progress_;
+  std::optional<std::pair<std::size_t, std::size_t>> pairs_;  // done, all; none before the first
 };
 
 }  // namespace
@@ -364,12 +311,9 @@ void add_reconstruct(CommandLine& line) {
   verb.option("--map-voxel-size", o->map_voxel_size,
               "Voxel size of map.ply; default: half the voxel size")
       .positive();
-  const Option resume =
-      verb.flag("--resume", o->resume, "Go on where an interrupted run of this output stopped")
-          .excludes(results);
-  verb.flag("--restart", o->restart, "Discard what an interrupted run of this output did")
-      .excludes(resume)
-      .excludes(results);
+  auto [resume, restart] = o->resume.add_to(verb);
+  resume.excludes(results);
+  restart.excludes(results);
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] {
     o->method.registration();  // reports bad options before the clouds are read
@@ -382,8 +326,10 @@ void add_reconstruct(CommandLine& line) {
                        "with --results and --no-audit: no pair is aligned");
     if (o->no_map) o->method.refuse({"--map-voxel-size"}, "with --no-map");
     check_output_folder(*o);
-    check_inputs(*o);
-    choose_voxel_size(o->method, o->input, o->resume ? o->journal() : "");
+    check_pairs(o->input, o->pairs);  // a bad file shall show before the clouds are read
+    if (!o->odometry.empty())
+      read_odometry(o->odometry, FragmentFolder(o->input, true).scans, o->input.path);
+    o->method.choose_voxel_size(o->input, o->resume.resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Reconstruct(*o).run();
   });

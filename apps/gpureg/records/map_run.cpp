@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "run/map_run.hpp"
+#include "records/map_run.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -12,7 +12,7 @@ std::string MapRun::file(const std::string& name) const {
 
 std::size_t MapRun::accepted_edges() const {
   return static_cast<std::size_t>(
-      std::count_if(map.edges.begin(), map.edges.end(),
+      std::count_if(made.map.edges.begin(), made.map.edges.end(),
                     [](const reconstruction::Edge& edge) { return edge.accepted; }));
 }
 
