@@ -39,17 +39,15 @@ RegistrationResult align_pair(const Context& context, const Cloud& source, const
   });
 }
 
-/// One call of align_batch from Python. Results reach Python between pieces of the batch.
+/// One call of align_batch from Python.
 class Batch {
  public:
   Batch(const Context& context, const py::list& clouds, const IndexArray& pairs,
-        const RegistrationOptions& options, py::object progress, py::object on_result)
+        const RegistrationOptions& options, py::object progress)
       : context_(context),
         options_(options),
         pairs_(entries_of<Pair>(pairs, "pairs")),
-        progress_(std::move(progress)),
-        on_result_(std::move(on_result)),
-        out_(pairs_.size()) {
+        progress_(std::move(progress)) {
     for (const py::handle cloud : clouds) prepared_.push_back(cloud.cast<const Cloud&>().prepared);
   }
 
@@ -61,10 +59,10 @@ class Batch {
       align_in_pieces();
     else
       align_at_once();
-    deliver();
     if (error_.is_none()) report();
-    while (told_ < pairs_.size()) take();  // those never tried
-    return py::make_tuple(std::move(out_), std::move(error_));
+    py::list out;
+    for (RegistrationResult& result : results_) out.append(py::cast(std::move(result)));
+    return py::make_tuple(std::move(out), std::move(error_));
   }
 
  private:
@@ -91,8 +89,7 @@ class Batch {
     const std::size_t most = 2 * std::size_t{context_.threads()} + 2;  // a chunk of the CPU
     std::size_t piece = 1;
     while (done_ < pairs_.size()) {
-      deliver();
-      if (!error_.is_none() || !report()) return;
+      if (!report()) return;
       const std::size_t count = std::min(piece, pairs_.size() - done_);
       const auto begin = std::chrono::steady_clock::now();
       if (!align_next(count)) return;
@@ -123,27 +120,7 @@ class Batch {
     }
   }
 
-  py::object take() {
-    out_[told_] = py::cast(std::move(results_[told_]));
-    return out_[told_++];
-  }
-
-  /// Hands the new results to Python.
-  void deliver() {
-    while (told_ < done_) {
-      const std::size_t k = told_;
-      const py::object result = take();
-      if (on_result_.is_none()) continue;
-      try {
-        on_result_(k, result);
-      } catch (const py::error_already_set& raised) {
-        error_ = raised.value();
-        on_result_ = py::none();
-      }
-    }
-  }
-
-  /// False where somebody raised: Ctrl-C, or a callback.
+  /// False where somebody raised: Ctrl-C, or progress.
   bool report() {
     try {
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -162,16 +139,15 @@ class Batch {
   std::vector<PreparedCloud> prepared_;  // copies share the data
   std::vector<Pair> pairs_;
   std::vector<RegistrationPrior> priors_;
-  py::object progress_, on_result_, error_ = py::none();
+  py::object progress_, error_ = py::none();
   std::vector<RegistrationResult> results_;
-  py::list out_;
-  std::size_t done_ = 0, told_ = 0;
+  std::size_t done_ = 0;
 };
 
 py::tuple align_pairs(const Context& context, const py::list& clouds, const IndexArray& pairs,
                       const RegistrationOptions& options, const py::object& progress,
-                      const std::vector<RegistrationPrior>& priors, const py::object& on_result) {
-  return Batch(context, clouds, pairs, options, progress, on_result).run(priors);
+                      const std::vector<RegistrationPrior>& priors) {
+  return Batch(context, clouds, pairs, options, progress).run(priors);
 }
 
 }  // namespace
@@ -181,7 +157,7 @@ void bind_align(py::module_& m) {
         py::arg("options"), py::arg("correspondences") = py::none(), py::arg("prior") = py::none());
   m.def("align_batch", &align_pairs, py::arg("context"), py::arg("clouds"), py::arg("pairs"),
         py::arg("options"), py::arg("progress") = py::none(),
-        py::arg("priors") = std::vector<RegistrationPrior>(), py::arg("on_result") = py::none());
+        py::arg("priors") = std::vector<RegistrationPrior>());
 }
 
 }  // namespace gpureg::python

@@ -2,6 +2,7 @@
 #include "gpureg/error.hpp"
 
 #include "bindings.hpp"
+#include "gpureg/sets/pair_journal.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -12,6 +13,7 @@ PyObject* invalid_argument = nullptr;
 PyObject* backend_unavailable = nullptr;
 PyObject* device_error = nullptr;
 PyObject* io_error = nullptr;
+PyObject* damaged_journal = nullptr;
 
 PyObject* make(py::module_& m, const char* name, const char* doc, PyObject* bases) {
   const std::string full = std::string("gpureg.") + name;
@@ -42,6 +44,7 @@ void bind_errors(py::module_& m) {
   io_error =
       make_kind(m, "IoError", "A file that cannot be read, is malformed, or cannot be written.",
                 PyExc_OSError);
+  damaged_journal = make(m, "DamagedJournal", "A journal of pairs that cannot be read.", io_error);
   py::register_local_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
@@ -51,6 +54,8 @@ void bind_errors(py::module_& m) {
       PyErr_SetString(backend_unavailable, e.what());
     } catch (const DeviceError& e) {
       PyErr_SetString(device_error, e.what());
+    } catch (const DamagedJournal& e) {
+      PyErr_SetString(damaged_journal, e.what());
     } catch (const IoError& e) {
       PyErr_SetString(io_error, e.what());
     } catch (const Error& e) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bindings.hpp"
+#include "gpureg/result.hpp"
 
 namespace gpureg::python {
 
@@ -49,6 +50,15 @@ inline py::array_t<float> array_of(const std::vector<Eigen::Vector3f>& rows) {
   float* next = out.mutable_data();
   for (const Eigen::Vector3f& row : rows)
     for (int k = 0; k < 3; ++k) *next++ = row[k];
+  return out;
+}
+
+/// (N, 4, 4)
+inline py::array_t<double> poses_array(const std::vector<UnalignedIsometry3d>& poses) {
+  py::array_t<double> out({static_cast<py::ssize_t>(poses.size()), py::ssize_t(4), py::ssize_t(4)});
+  double* next = out.mutable_data();
+  for (const UnalignedIsometry3d& pose : poses)
+    for (int k = 0; k < 16; ++k) *next++ = pose.matrix()(k / 4, k % 4);
   return out;
 }
 

@@ -23,6 +23,7 @@ PYBIND11_MODULE(_core, m) {
   bind_map_options(m);
   bind_pose_graph(m);
   bind_loop_closure(m);
+  bind_sets(m);
   bind_reconstruction(m);
   bind_localization(m);
   bind_pruning(m);

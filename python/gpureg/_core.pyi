@@ -731,7 +731,6 @@ def align_batch(
     options: RegistrationOptions,
     progress: Callable[[int], object] | None = None,
     priors: Sequence[RegistrationPrior] = ...,
-    on_result: Callable[[int, RegistrationResult], object] | None = None,
 ) -> tuple[list[RegistrationResult], BaseException | None]: ...
 def loop_consistency(
     pairs: npt.NDArray[np.uint32],
@@ -1179,6 +1178,75 @@ class LoopAcceptanceOptions:
     _fields: tuple[str, ...]
     # end of fields
 
+class DamagedJournal(IoError): ...
+
+class FragmentSource:
+    def __init__(
+        self,
+        names: Sequence[str],
+        fingerprints: Sequence[str],
+        load: Callable[[int, PrepareOptions], Any],
+    ) -> None: ...
+
+class PairJournal:
+    def __init__(
+        self,
+        path: str,
+        options: RegistrationOptions,
+        fragments: FragmentSource,
+        pairs: npt.NDArray[np.uint32],
+        mode: str,
+    ) -> None: ...
+    @property
+    def size(self) -> int: ...
+    @property
+    def done(self) -> int: ...
+    @property
+    def resumed(self) -> int: ...
+    @property
+    def note(self) -> int | None: ...
+    def set_note(self, note: int) -> None: ...
+    def has(self, pair: int) -> bool: ...
+    def result(self, pair: int) -> RegistrationResult: ...
+    def add(self, pair: int, result: RegistrationResult) -> None: ...
+    def flush(self) -> None: ...
+    def close(self) -> None: ...
+
+class FragmentAligner:
+    def __init__(
+        self,
+        context: Context,
+        fragments: FragmentSource,
+        options: RegistrationOptions,
+        memory: int,
+    ) -> None: ...
+    def align(
+        self,
+        pairs: npt.NDArray[np.uint32],
+        on_result: Callable[[int, RegistrationResult], object],
+    ) -> None: ...
+    @property
+    def unusable(self) -> dict[int, str]: ...
+
+def read_journal(
+    path: str,
+) -> tuple[list[str], npt.NDArray[np.uint32], list[RegistrationResult]]: ...
+def in_tiles(pairs: npt.NDArray[np.uint32]) -> list[int]: ...
+def prepare_set(
+    context: Context,
+    fragments: FragmentSource,
+    options: PrepareOptions,
+    progress: Callable[[int], object] | None = None,
+) -> list[PreparedCloud | str]: ...
+def register_set(
+    contexts: Sequence[Context],
+    fragments: FragmentSource,
+    journal: PairJournal,
+    options: RegistrationOptions,
+    memory: int,
+    progress: Callable[[int, int], object] | None,
+) -> dict[int, str]: ...
+
 class MapOptions:
     # fields of MapOptions
     prepare: PrepareOptions
@@ -1588,8 +1656,6 @@ class MapGraph:
     @property
     def islands(self) -> list[list[int]]: ...
 
-class Surface: ...
-
 class VoxelMap:
     def __init__(self, voxel_size: float) -> None: ...
     def add(
@@ -1597,19 +1663,26 @@ class VoxelMap:
     ) -> None: ...
     def cloud(self) -> tuple[npt.NDArray[Any], _Float32 | None]: ...
 
-REFINE_ITERATIONS: int
+class ReconstructOptions:
+    def __init__(
+        self,
+        registration: RegistrationOptions,
+        graph: ReconstructionOptions,
+        audit: AuditOptions,
+        with_audit: bool,
+        with_refinement: bool,
+        journal: str,
+    ) -> None: ...
 
-def reconstruct_map(
-    scans: int,
-    pairs: npt.NDArray[np.uint32],
-    results: list[RegistrationResult],
-    options: ReconstructionOptions,
-    odometry: _Float64 | list[tuple[int, int, _Float64, _Float64 | None]],
+def reconstruct_set(
     context: Context,
-    clouds: list[PreparedCloud],
-    registration: RegistrationOptions,
-    audit_options: AuditOptions,
-) -> tuple[MapGraph, AuditRecord | None, bool]: ...
+    fragments: FragmentSource,
+    pairs: npt.NDArray[np.uint32] | None,
+    results: list[RegistrationResult] | None,
+    odometry: _Float64 | list[tuple[int, int, _Float64, _Float64 | None]],
+    options: ReconstructOptions,
+    progress: Callable[[int, int, int], object] | None,
+) -> dict[str, Any]: ...
 
 class AuditRecord:
     @property
@@ -1642,18 +1715,6 @@ def mend(
     options: RegistrationOptions,
     audit_options: AuditOptions,
 ) -> tuple[_Float64, list[int], list[int], int, AuditRecord]: ...
-def refine_map(
-    context: Context,
-    map: MapGraph,
-    surfaces: list[Surface | None],
-    voxel_size: float,
-    tell: Callable[[int], object] | None,
-) -> dict[str, Any]: ...
-def surface_of(context: Context, cloud: Any, registration: PrepareOptions) -> Surface: ...
-def surface_options(registration: PrepareOptions) -> PrepareOptions: ...
-def result_of_row(
-    aligned: bool, target_from_source: _Float64 | None, score: float, information: _Float64 | None
-) -> RegistrationResult: ...
 def learn_words(clouds: list[_Float32], most: int) -> _Float32: ...
 def describe_features(features: _Float32, words: _Float32) -> _Float32: ...
 
@@ -1714,8 +1775,7 @@ def read_odometry(
     numbers: Sequence[int],
     names: Sequence[str],
     folder: str,
-    unusable: Sequence[int],
-) -> list[tuple[int, int, _Float64, None]]: ...
+) -> _Float64 | list[tuple[int, int, _Float64, None]]: ...
 def read_trajectory(path: str, format: str) -> tuple[_Float64, _Float64]: ...
 def evaluate_trajectory(
     times: _Float64,

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,16 +18,13 @@ from ._contexts import checked, context_of
 from ._core import (
     AuditOptions,
     Context,
-    MapGraph,
     ReconstructionOptions,
     RegistrationOptions,
     RegistrationResult,
 )
 from ._map import Map
-from ._progress import Progress, batch_progress
+from ._progress import Progress, Report, batch_progress
 from .fragments import FragmentSet, fragment_set
-from .preparation import check_enough, usable_fragments
-from .registration import ALIGNED, align_batch
 
 
 def reconstruct(
@@ -40,6 +38,7 @@ def reconstruct(
     options: RegistrationOptions | None = None,
     map_options: ReconstructionOptions | None = None,
     audit_options: AuditOptions | None = None,
+    journal: str | os.PathLike[str] | None = None,
     context: Context | None = None,
     progress: Progress = False,
 ) -> Map:
@@ -53,9 +52,9 @@ def reconstruct(
         Pairs of fragment numbers that are aligned, see `FragmentSet.choose_pairs`; default "all",
         and `gpureg.pruning.Nearest` for large sets. With a sequence as results: rows (source,
         target) of fragment numbers, as given to `align_batch`.
-    results : sequence of RegistrationResult, or BatchRun, optional
-        Instead of aligning: one result per pair, or what `register_all` returned. The table of a
-        `register_all` keeps the best pose of a pair only, so that other modes take no part.
+    results : sequence of RegistrationResult, BatchRun, or path, optional
+        Instead of aligning: one result per pair, what `register_all` returned, or a journal of pairs
+        (``pairs.journal`` of a `BatchRun`).
     odometry : path, (N, 4, 4) array, or sequence, optional
         Known poses: a trajectory file (TUM with numbers or names as times, or poses.txt),
         ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
@@ -72,6 +71,9 @@ def reconstruct(
         Of the map: drift of the odometry, confidences, islands. Default: those of the voxel size.
     audit_options : AuditOptions, optional
         Of the audit. Default: those of the voxel size.
+    journal : path, optional
+        File that keeps the results of the pairs until the map is complete: the same call goes on
+        after an interruption, even a kill -9.
     context : Context, optional
     progress : bool or callable
         True: bars of tqdm. A callable gets (done, total) of each step: fragments, pairs, fragments
@@ -85,11 +87,12 @@ def reconstruct(
     Raises
     ------
     ValueError
-        Naming the argument: a repeated pair, an unknown fragment, results of another number.
+        Naming the argument: a repeated pair, an unknown fragment, results of another number, a
+        journal of another run.
     IoError
-        If fewer than two fragments can be used.
-    BatchInterrupted
-        After Ctrl-C during the alignment; its ``results`` hold what is done.
+        If fewer than two fragments can be used, or the journal is damaged.
+    KeyboardInterrupt
+        After Ctrl-C.
 
     Examples
     --------
@@ -105,40 +108,67 @@ def reconstruct(
     ) or ReconstructionOptions.from_voxel_size(options.prepare.voxel_size)
     map_options.validate()
     context = context_of(context)
-    if map_options.threads == 0 and context.backend == "cpu":
-        map_options = map_options.replace(threads=context.threads)
     fragments = fragment_set(fragments)
     fragments.check_files()
     rows, values = _pair_results(fragments, pairs, results)
-    known = _odometry(odometry, fragments)
-    unusable: dict[int, str] = {}
-    clouds: list[_core.PreparedCloud] = []
-    if audit or values is None:
-        clouds = usable_fragments(fragments, options.prepare, context, progress, unusable)
-    elif refine:
-        _find_unreadable(fragments, options.prepare, unusable)
-    usable = fragments
-    if unusable:
-        usable = fragments.without(unusable)
-        rows, values = _pairs_of_others(rows, values, unusable, len(fragments))
-        known = _odometry_of_others(odometry, known, unusable, fragments)
-    if values is None:
-        values = align_batch(clouds, rows, options=options, context=context, progress=progress)
-    graph, record, places_look_alike = _core.reconstruct_map(
-        len(usable),
-        rows,
-        values,
-        map_options,
-        known,
-        context,
-        clouds if audit else [],
+    steps = _Steps(progress)
+    try:
+        made = _core.reconstruct_set(
+            context,
+            fragments._core(fingerprints=journal is not None),
+            rows,
+            values,
+            _odometry(odometry, fragments),
+            _core.ReconstructOptions(
+                options, map_options, audit_options, audit, refine, os.fspath(journal or "")
+            ),
+            steps if progress else None,
+        )
+    finally:
+        steps.close()
+    unusable = made["unusable"]
+    usable = fragments.without(unusable) if unusable else fragments
+    found = None if made["audit"] is None else Audit._of(made["audit"], usable.numbers)
+    return Map(
+        made["map"],
+        usable,
         options,
-        audit_options,
+        made["refinement"],
+        fragments,
+        unusable,
+        found,
+        made["places_look_alike"],
     )
-    del clouds
-    refinement = _refine(graph, usable, options, context, progress) if refine else None
-    found = None if record is None else Audit._of(record, usable.numbers)
-    return Map(graph, usable, options, refinement, fragments, unusable, found, places_look_alike)
+
+
+class _Steps:
+    """Progress of one step after another."""
+
+    TITLES = (
+        ("preparing", "cloud"),
+        ("aligning", "pair"),
+        ("preparing", "cloud"),
+        ("refining", "step"),
+    )
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._step = progress, -1
+        self._stack = contextlib.ExitStack()
+        self._report: Report | None = None
+
+    def __call__(self, step: int, done: int, total: int) -> None:
+        if step != self._step:
+            self.close()
+            self._step = step
+            title, unit = self.TITLES[step]
+            self._report = self._stack.enter_context(
+                batch_progress(self._progress, title, total, done, unit)
+            )
+        if self._report is not None:
+            self._report(done)
+
+    def close(self) -> None:
+        self._stack.close()
 
 
 def _positions(fragments: FragmentSet, numbers: npt.NDArray[np.int64], name: str) -> Any:
@@ -155,14 +185,22 @@ def _positions(fragments: FragmentSet, numbers: npt.NDArray[np.int64], name: str
 def _pair_results(
     fragments: FragmentSet, pairs: Any, results: Any
 ) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult] | None]:
-    """None: the pairs are to be aligned."""
+    """Rows (source, target). None: the pairs are to be aligned."""
     if results is None:
         chosen = fragments.choose_pairs("all" if pairs is None else pairs)
         return np.ascontiguousarray(chosen[:, ::-1], np.uint32), None  # the later into the earlier
-    if hasattr(results, "table"):  # a BatchRun
+    if isinstance(results, str | os.PathLike) or hasattr(results, "journal"):
         if pairs is not None:
-            raise TypeError("pairs: those of a BatchRun come with its results")
-        return _from_table(fragments, results.table())
+            raise TypeError("pairs: those of a run come with its results")
+        path = results.journal if hasattr(results, "journal") else results
+        names, rows, values = _core.read_journal(os.fspath(path))
+        places = {name: k for k, name in enumerate(fragments.names)}
+        strange = next((name for name in names if name not in places), None)
+        used = set(rows.ravel().tolist())
+        places_of = [places.get(name, len(fragments)) for name in names]
+        if strange is not None and any(places_of[k] == len(fragments) for k in used):
+            raise ValueError(f"results: {path} names {strange}, which fragments lacks")
+        return np.asarray(places_of, np.uint32)[rows].reshape(-1, 2), values
     if pairs is None:
         raise TypeError("pairs: needed with results, one per result")
     values = list(results)
@@ -175,52 +213,14 @@ def _pair_results(
     return _positions(fragments, entries.astype(np.int64), "pairs"), values
 
 
-def _pairs_of_others(
-    rows: npt.NDArray[np.uint32],
-    values: list[RegistrationResult] | None,
-    unusable: Collection[int],
-    count: int,
-) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult] | None]:
-    """Without those of unusable fragments, as positions among the others."""
-    places = np.array([k not in unusable for k in range(count)])
-    kept = np.flatnonzero(places[rows].all(axis=1))
-    rows = (np.cumsum(places) - 1)[rows[kept]].astype(np.uint32)
-    return rows, None if values is None else [values[k] for k in kept.tolist()]
-
-
-def _from_table(
-    fragments: FragmentSet, table: Any
-) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult]]:
-    columns = {
-        name: table[name].to_pylist()
-        for name in ("i", "j", "status", "score", "target_from_source", "information")
-    }
-    numbers = np.stack([columns["j"], columns["i"]], axis=1).astype(np.int64)
-    values = []
-    for status, score, pose, information in zip(
-        columns["status"],
-        columns["score"],
-        columns["target_from_source"],
-        columns["information"],
-        strict=True,
-    ):
-        values.append(
-            _core.result_of_row(
-                status in ALIGNED,
-                None if pose is None else np.reshape(pose, (4, 4)),
-                score,
-                None if information is None else np.reshape(information, (6, 6)),
-            )
-        )
-    return _positions(fragments, numbers, "results"), values
-
-
 def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
     """As the core takes it."""
     if odometry is None:
         return []
     if isinstance(odometry, str | os.PathLike):
-        return _from_file(odometry, fragments)
+        return _core.read_odometry(
+            os.fspath(odometry), fragments.numbers, fragments.names, "the set of fragments"
+        )
     if hasattr(odometry, "shape"):
         poses = float64(odometry, "odometry")
         if poses.shape != (len(fragments), 4, 4):
@@ -237,64 +237,6 @@ def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
         information = entry[3] if len(entry) == 4 else None
         out.append((source, target, float64(entry[2], f"odometry[{k}]"), information))
     return out
-
-
-def _from_file(
-    path: str | os.PathLike[str], scans: FragmentSet, unusable: Sequence[int] = ()
-) -> list[Any]:
-    return list(
-        _core.read_odometry(
-            os.fspath(path), scans.numbers, scans.names, "the set of fragments", list(unusable)
-        )
-    )
-
-
-def _odometry_of_others(
-    odometry: Any, known: Any, unusable: Collection[int], of: FragmentSet
-) -> Any:
-    """known: `_odometry` of the whole set."""
-    kept = [k for k in range(len(of)) if k not in unusable]
-    if isinstance(odometry, str | os.PathLike):
-        return _from_file(odometry, of.without(unusable), [of.numbers[k] for k in unusable])
-    if isinstance(known, np.ndarray):
-        return known[kept]
-    places = {k: place for place, k in enumerate(kept)}
-    return [
-        (places[edge[0]], places[edge[1]], *edge[2:])
-        for edge in known
-        if edge[0] in places and edge[1] in places
-    ]
-
-
-def _find_unreadable(
-    fragments: FragmentSet, options: _core.PrepareOptions, unusable: dict[int, str]
-) -> None:
-    for k in range(len(fragments)):
-        try:
-            fragments.load(k, options)
-        except OSError as error:
-            unusable[k] = str(error)
-    check_enough(fragments, unusable)
-
-
-def _refine(
-    graph: MapGraph,
-    fragments: FragmentSet,
-    options: RegistrationOptions,
-    context: Context,
-    progress: Progress,
-) -> dict[str, Any]:
-    placed = [k for k, scan in enumerate(graph.scans) if scan[0]]
-    surfaces: list[_core.Surface | None] = [None] * len(fragments)
-    finer = _core.surface_options(options.prepare)
-    with batch_progress(progress, "preparing", len(placed), unit="cloud") as report:
-        for done, k in enumerate(placed, 1):
-            surfaces[k] = _core.surface_of(context, fragments.load(k, finer), options.prepare)
-            if report is not None:
-                report(done)
-    with batch_progress(progress, "refining", _core.REFINE_ITERATIONS, unit="step") as report:
-        tell = None if report is None else report
-        return _core.refine_map(context, graph, surfaces, options.prepare.voxel_size, tell)
 
 
 __all__ = ["reconstruct"]

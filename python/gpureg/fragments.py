@@ -159,6 +159,14 @@ class FragmentSet:
                 raise IoError(str(error)) from error
             raise
 
+    def _core(self, fingerprints: bool = False) -> _core.FragmentSource:
+        """As the library takes it. fingerprints: for a journal; reads all data once."""
+        return _core.FragmentSource(
+            self._names,
+            [self.fingerprint(k) for k in range(len(self))] if fingerprints else [],
+            self.load,
+        )
+
     def check_files(self) -> None:
         """Raises FileNotFoundError for a path where nothing is: that is no bad fragment, but a wrong
         argument.

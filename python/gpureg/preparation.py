@@ -6,8 +6,7 @@ in.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from . import _core
@@ -186,40 +185,6 @@ def prepared(
     return clouds
 
 
-def prepare_usable(
-    context: Context,
-    loads: Mapping[int, Callable[[], CoreCloud]],
-    options: PrepareOptions,
-    unusable: dict[int, str],
-) -> list[tuple[int, PreparedCloud]]:
-    """Fragments by position, together, and one by one if one of them cannot be prepared.
-    unusable gets those whose files cannot be read or that cannot be prepared, and why.
-    """
-    inputs: dict[int, CoreCloud] = {}
-    for k, load in loads.items():
-        try:
-            inputs[k] = load()
-        except OSError as error:
-            unusable[k] = str(error)
-    try:
-        clouds = _prepare_together(context, inputs, options)
-    except ValueError:
-        clouds = []
-        for k, cloud in inputs.items():
-            try:
-                clouds += _prepare_together(context, {k: cloud}, options)
-            except ValueError as error:
-                unusable[k] = str(error)
-    return list(zip([k for k in inputs if k not in unusable], clouds, strict=True))
-
-
-def _prepare_together(
-    context: Context, inputs: Mapping[int, CoreCloud], options: PrepareOptions
-) -> list[PreparedCloud]:
-    names = [f"fragments[{k}]" for k in inputs]
-    return _core.prepare_batch(context, list(inputs.values()), options, names) if inputs else []
-
-
 def usable_fragments(
     fragments: FragmentSet,
     options: PrepareOptions,
@@ -230,18 +195,14 @@ def usable_fragments(
     """Prepared. unusable gets the positions of those that cannot be, and why; raises IoError if
     fewer than two are left.
     """
-    out: list[PreparedCloud] = []
-    device = context.backend == "cuda"
     with batch_progress(progress, "preparing", len(fragments), unit="cloud") as report:
-        for piece in pieces(len(fragments), context):
-            loads = {k: partial(fragments.load, k, options, device) for k in piece}
-            out += [cloud for _, cloud in prepare_usable(context, loads, options, unusable)]
-            if report is not None:
-                report(len(out) + len(unusable))
-    check_enough(fragments, unusable)
-    return out
-
-
-def check_enough(fragments: FragmentSet, unusable: dict[int, str]) -> None:
-    if unusable and len(fragments) - len(unusable) < 2:
+        prepared = _core.prepare_set(context, fragments._core(), options, report)
+    clouds = []
+    for k, cloud in enumerate(prepared):
+        if isinstance(cloud, str):
+            unusable[k] = cloud
+        else:
+            clouds.append(cloud)
+    if unusable and len(clouds) < 2:
         raise IoError(f"fragments: fewer than two can be used: {next(iter(unusable.values()))}")
+    return clouds

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import time
-from pathlib import Path
 from typing import Any
 
 try:
@@ -21,13 +20,18 @@ except ImportError as error:
         "gpureg.ray needs Ray: pip install 'gpureg[ray]', or '.[ray]' from a checkout"
     ) from error
 
-from ._batch.plan import Plan
-from ._batch.residency import Residency
-from ._batch.store import Row, Store
-from ._core import Context, RegistrationOptions
-from ._progress import Progress, Report, batch_progress
-from .batch import CHUNK, MEMORY, BatchRun, conclude, make_plan, run_chunk
+import numpy as np
+import numpy.typing as npt
 
+from . import _core
+from ._batch.folder import RunFolder
+from ._contexts import whole_number_of
+from ._core import Context, RegistrationOptions, RegistrationResult
+from ._progress import Progress, Report, batch_progress
+from .batch import MEMORY, BatchRun, conclude, open_run
+from .fragments import FragmentSet
+
+_CHUNK = 256  # pairs that an actor takes at a time
 # of one actor, before the run gives up: a chunk that kills whoever takes it shall not go on for
 # ever
 _DEATHS = 16
@@ -48,30 +52,33 @@ class ProgressBoard:
 
 
 class ChunkWorker:
-    """What an actor does: chunks of a plan, one after another, its fragments resident in between."""
+    """What an actor does: chunks of pairs, one after another, its fragments resident in between."""
 
-    def __init__(self, plan: Plan, memory: int, threads: int) -> None:
+    def __init__(
+        self, fragments: FragmentSet, options: RegistrationOptions, memory: int, threads: int
+    ) -> None:
         context = (
             Context.cpu(threads) if threads else Context.cuda()
         )  # Ray shows an actor its own GPU as device 0
-        self._plan, self._residency = plan, Residency(context, plan.fragments, plan.options, memory)
+        self._aligner = _core.FragmentAligner(context, fragments._core(), options, memory)
 
     def run(
-        self, chunk: int, known: dict[Any, Row], board: Any = None
-    ) -> tuple[int, list[Row], dict[int, str]]:
-        """The chunk, its rows, and the fragments that could not be used so far."""
-        done, told = len(known), time.monotonic()
+        self, chunk: int, pairs: npt.NDArray[np.uint32], board: Any = None
+    ) -> tuple[int, list[tuple[int, RegistrationResult]], dict[int, str]]:
+        """The chunk, its results by row, and the fragments that could not be used so far."""
+        results: list[tuple[int, RegistrationResult]] = []
+        told = time.monotonic()
 
-        def add(row: Row) -> None:
-            nonlocal done, told
-            done += 1
+        def take(row: int, result: RegistrationResult) -> None:
+            nonlocal told
+            results.append((row, result))
             now = time.monotonic()
             if board is not None and now - told >= _POLL:
-                board.write.remote(chunk, done)
+                board.write.remote(chunk, len(results))
                 told = now
 
-        rows = run_chunk(self._plan, chunk, self._residency, known, add)
-        return chunk, rows, self._residency.unusable
+        self._aligner.align(pairs, take)
+        return chunk, results, self._aligner.unusable
 
 
 def register_all(
@@ -84,7 +91,7 @@ def register_all(
     gpus: bool | None = None,
     progress: Progress = True,
     resume: bool = True,
-    chunk_size: int = CHUNK,
+    chunk_size: int = _CHUNK,
     memory: int = MEMORY,
 ) -> BatchRun:
     """`gpureg.register_all` on the machines of a Ray cluster.
@@ -96,7 +103,7 @@ def register_all(
 
     Parameters
     ----------
-    fragments, pairs, output, options, progress, resume, chunk_size, memory
+    fragments, pairs, output, options, progress, resume, memory
         As for `gpureg.register_all`; memory is per actor. Progress counts pairs of unfinished chunks,
         too; those are done again after the driver's death. Folders must be where every machine finds
         them under the same name; clouds in memory travel by Ray's object store.
@@ -104,6 +111,8 @@ def register_all(
         Default: one per GPU of the cluster, or one per CPU.
     gpus : bool, optional
         Whether actors use a GPU each. Default: if the cluster has any.
+    chunk_size : int
+        Pairs that an actor takes at a time.
 
     Returns
     -------
@@ -115,51 +124,52 @@ def register_all(
         If an actor died more often than can be an accident; what was done is on disk.
     """
     begin = time.monotonic()
-    plan = make_plan(fragments, pairs, options, chunk_size, memory)
-    if not ray.is_initialized():
-        ray.init()
-    store = Store(Path(output), plan, resume)
+    whole_number_of(chunk_size, "chunk_size", 1)
+    run = open_run(fragments, pairs, output, options, resume, memory)
     workers: list[Any] = []
     unusable: dict[int, str] = {}
     try:
-        finished = store.finished()
-        known = {
-            chunk: store.partial(chunk) for chunk in range(plan.chunks) if chunk not in finished
-        }
-        resumed = sum(len(plan.chunk(chunk)) for chunk in finished) + sum(map(len, known.values()))
-        if known:
-            workers = _start(plan, memory, actors, gpus)
-            with batch_progress(progress, "aligning", len(plan.pairs), resumed) as report:
-                _run(plan, store, known, workers, report, unusable)
-        return conclude(store, plan, resumed, begin, unusable)
+        left = run.left()
+        if left:
+            if not ray.is_initialized():
+                ray.init()
+            chunks = [left[k : k + chunk_size] for k in range(0, len(left), chunk_size)]
+            workers = _start(run, int(memory), actors, gpus)
+            done = run.journal.done
+            with batch_progress(progress, "aligning", run.journal.size, done) as report:
+                _run(run, chunks, workers, report, unusable)
+        return conclude(run, begin, unusable)
     finally:
         for worker in workers:
             ray.kill(worker)
-        store.close()
+        run.close()
 
 
 def _run(
-    plan: Plan,
-    store: Store,
-    known: dict[int, dict[Any, Row]],
+    run: RunFolder,
+    chunks: list[list[int]],
     workers: list[Any],
     report: Report | None,
     unusable: dict[int, str],
 ) -> None:
-    """All chunks that are left, each written as it comes back. unusable gets what could not be used."""
+    """Each chunk is written as it comes back. unusable gets what could not be used."""
     board = None if report is None else ray.remote(ProgressBoard).options(num_cpus=0).remote()
     pool = ActorPool(workers)
-    for task in known.items():
-        pool.submit(lambda worker, task: worker.run.remote(*task, board), task)
-    before = len(plan.pairs) - sum(len(plan.chunk(chunk)) for chunk in known)
-    done = {chunk: len(rows) for chunk, rows in known.items()}
+    for task in enumerate(chunks):
+        pool.submit(
+            lambda worker, task: worker.run.remote(task[0], run.pairs[task[1]], board), task
+        )
+    before = run.journal.done
+    done = dict.fromkeys(range(len(chunks)), 0)
     try:
         while pool.has_next():
             try:
-                chunk, rows, bad = pool.get_next_unordered(timeout=_POLL)
-                store.write(chunk, rows)
+                chunk, results, bad = pool.get_next_unordered(timeout=_POLL)
+                for row, result in results:
+                    run.journal.add(chunks[chunk][row], result)
+                run.journal.flush()
                 unusable.update(bad)
-                done[chunk] = len(plan.chunk(chunk))
+                done[chunk] = len(chunks[chunk])
             except TimeoutError:
                 for chunk, count in _read(board).items():
                     # A chunk that is tried again after its actor's death begins anew.
@@ -182,7 +192,7 @@ def _read(board: Any) -> dict[int, int]:
         return {}
 
 
-def _start(plan: Plan, memory: int, actors: int | None, gpus: bool | None) -> list[Any]:
+def _start(run: RunFolder, memory: int, actors: int | None, gpus: bool | None) -> list[Any]:
     resources = ray.cluster_resources()
     cpus, devices = float(resources.get("CPU", 1)), int(resources.get("GPU", 0))
     if gpus is None:
@@ -196,9 +206,10 @@ def _start(plan: Plan, memory: int, actors: int | None, gpus: bool | None) -> li
         limits.update(num_gpus=min(1, devices / count), num_cpus=min(1.0, share))
     else:
         limits.update(num_cpus=int(share) if share >= 1 else share)
-    shared = ray.put(plan)
+    shared = ray.put(run.fragments)
+    threads = 0 if gpus else max(1, int(share))
     actor = ray.remote(ChunkWorker).options(**limits)
-    return [actor.remote(shared, memory, 0 if gpus else max(1, int(share))) for _ in range(count)]
+    return [actor.remote(shared, run.options, memory, threads) for _ in range(count)]
 
 
 __all__ = ["register_all"]

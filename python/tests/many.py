@@ -8,7 +8,7 @@ import sys
 import gpureg
 from scenes import few, moved, pose, room
 
-FRAGMENTS, CHUNK = 46, 16  # 1,035 pairs in 65 chunks
+FRAGMENTS = 46  # 1,035 pairs
 
 
 def fragments():
@@ -25,7 +25,6 @@ def run(folder, progress=False, **keywords):
         fragments(),
         output=folder,
         options=options(),
-        chunk_size=CHUNK,
         progress=progress,
         **keywords,
     )

@@ -34,7 +34,7 @@ def cluster():
 
 
 def scene():
-    return many.fragments()[:20], {"options": few(3000, 0.08), "chunk_size": 10, "progress": False}
+    return many.fragments()[:20], {"options": few(3000, 0.08), "progress": False}
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def files_of(run):
 @pytest.mark.parametrize("actors", [1, 2, 4])
 def test_any_number_of_actors(whole, tmp_path, actors):
     clouds, keywords = scene()
-    run = gpureg.ray.register_all(clouds, output=tmp_path, actors=actors, **keywords)
+    run = gpureg.ray.register_all(clouds, output=tmp_path, actors=actors, chunk_size=10, **keywords)
     assert run.pairs == 190 and run.resumed == 0
     assert files_of(run) == files_of(whole)
 
@@ -81,7 +81,7 @@ def test_an_actor_is_killed_midway(whole, tmp_path):
                 killed.append(busy[0])
 
     run = gpureg.ray.register_all(
-        clouds, output=tmp_path, actors=2, **{**keywords, "progress": progress}
+        clouds, output=tmp_path, actors=2, chunk_size=10, **{**keywords, "progress": progress}
     )
     assert killed
     assert files_of(run) == files_of(whole)
@@ -96,7 +96,7 @@ def test_either_goes_on_where_the_other_stopped(whole, tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         gpureg.register_all(clouds, output=tmp_path, **{**keywords, "progress": stop})
-    run = gpureg.ray.register_all(clouds, output=tmp_path, **keywords)
+    run = gpureg.ray.register_all(clouds, output=tmp_path, chunk_size=10, **keywords)
     assert run.resumed >= 50 and files_of(run) == files_of(whole)
 
 
@@ -127,11 +127,15 @@ def test_a_bad_fragment_costs_its_own_pairs(tmp_path):
     bad = tmp_path / "cloud_bin_3.ply"
     content = bad.read_bytes()
     bad.write_bytes(content[:1000])
-    keywords = {"options": few(500, 0.08), "chunk_size": 4, "progress": False}
-    run = gpureg.ray.register_all(tmp_path, output=tmp_path / "a", actors=2, **keywords)
+    keywords = {"options": few(500, 0.08), "progress": False}
+    run = gpureg.ray.register_all(
+        tmp_path, output=tmp_path / "a", actors=2, chunk_size=4, **keywords
+    )
     assert run.pairs == 6 and list(run.unusable) == [3] and "truncated" in run.unusable[3]
     bad.write_bytes(content)
-    run = gpureg.ray.register_all(tmp_path, output=tmp_path / "a", actors=2, **keywords)
+    run = gpureg.ray.register_all(
+        tmp_path, output=tmp_path / "a", actors=2, chunk_size=4, **keywords
+    )
     assert run.resumed == 6 and not run.unusable
     one = gpureg.register_all(tmp_path, output=tmp_path / "b", **keywords)
     assert files_of(run) == files_of(one)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Maps from unordered scans, and errors of trajectories."""
 
+import os
+import signal
+
 import gpureg
 import numpy as np
 import pytest
@@ -57,22 +60,6 @@ def test_points_of_the_map(map_of_scans, scans):
         map_of_scans.points(1)
 
 
-def test_the_threads_are_those_of_the_context(map_of_scans, scans, monkeypatch):
-    from gpureg import _core
-
-    pairs = [(j, i) for i in range(3) for j in range(i + 1, 3)]
-    results = gpureg.align_batch(scans[:3], pairs, options=OPTIONS)
-    given, make = [], _core.reconstruct_map
-    monkeypatch.setattr(
-        _core, "reconstruct_map", lambda *values: given.append(values[3].threads) or make(*values)
-    )
-    context = gpureg.Context.cpu(3)
-    gpureg.reconstruct(
-        scans[:3], pairs, results=results, refine=False, options=OPTIONS, context=context
-    )
-    assert given == [context.threads] == [3]
-
-
 def test_same_map_from_results(map_of_scans, scans):
     pairs = [(j, i) for i in range(7) for j in range(i + 1, 7)]
     results = gpureg.align_batch(scans, pairs, options=OPTIONS)
@@ -84,10 +71,33 @@ def test_map_from_a_run_of_register_all(map_of_scans, scans, tmp_path):
     pytest.importorskip("pyarrow")
     run = gpureg.register_all(scans, output=tmp_path, options=OPTIONS, progress=False)
     again = gpureg.reconstruct(scans, results=run, options=OPTIONS)
-    assert again.islands == map_of_scans.islands
-    assert np.nanmax(np.abs(again.poses - map_of_scans.poses)) < 0.02
+    assert np.array_equal(again.poses, map_of_scans.poses, equal_nan=True)
+    again = gpureg.reconstruct(scans, results=run.journal, options=OPTIONS)
+    assert np.array_equal(again.poses, map_of_scans.poses, equal_nan=True)
+    with pytest.raises(ValueError, match="names 6, which fragments lacks"):
+        gpureg.reconstruct(scans[:6], results=run, options=OPTIONS)
     with pytest.raises(TypeError, match="pairs"):
         gpureg.reconstruct(scans, "all", results=run, options=OPTIONS)
+
+
+def test_goes_on_after_an_interruption(map_of_scans, scans, tmp_path):
+    journal, seen = tmp_path / "pairs.journal", []
+
+    def stop(done, total):
+        if total == 21 and done >= 5:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        gpureg.reconstruct(scans, options=OPTIONS, journal=journal, progress=stop)
+    assert journal.exists()
+    with pytest.raises(ValueError, match="options.seed was 1, now 2"):
+        gpureg.reconstruct(scans, options=OPTIONS.replace(seed=2), journal=journal)
+    again = gpureg.reconstruct(
+        scans, options=OPTIONS, journal=journal, progress=lambda *counts: seen.append(counts)
+    )
+    assert next(done for done, total in seen if total == 21) >= 5
+    assert not journal.exists()
+    assert np.array_equal(again.poses, map_of_scans.poses, equal_nan=True)
 
 
 def test_folder_with_numbers(scans, tmp_path):

@@ -123,9 +123,8 @@ RegisterAllReport register_all(
   if (threads.empty() && !contexts.empty()) run.work(0, contexts[0], fragments, options, memory);
   std::exception_ptr raised = nullptr;
   std::unique_lock lock(run.mutex);
-  while (run.ended < threads.size()) {
-    run.changed.wait_for(lock, kPeriod);
-    if (!go_on || raised || run.stop) continue;
+  const auto tell = [&] {
+    if (!go_on || raised || run.stop) return;
     std::size_t prepared = 0;
     for (const std::size_t of_thread : run.prepared) prepared += of_thread;
     const std::size_t done = journal.done();
@@ -137,7 +136,12 @@ RegisterAllReport register_all(
       run.stop = true;
     }
     lock.lock();
+  };
+  while (run.ended < threads.size()) {
+    run.changed.wait_for(lock, kPeriod);
+    tell();
   }
+  tell();  // the end, however short the run was
   lock.unlock();
   for (std::thread& thread : threads) thread.join();
   if (raised) std::rethrow_exception(raised);

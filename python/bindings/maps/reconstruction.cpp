@@ -9,7 +9,9 @@
 #include "cloud_input.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction/mend.hpp"
+#include "gpureg/reconstruction/reconstruct.hpp"
 #include "interrupt.hpp"
+#include "maps/python_set.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
@@ -18,15 +20,6 @@ namespace {
 using namespace reconstruction;
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style>;
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
-
-std::vector<Pair> pairs_of(const IndexArray& rows) {
-  if (rows.ndim() != 2 || rows.shape(1) != 2)
-    throw py::type_error("pairs: not a matrix with two columns");
-  std::vector<Pair> pairs(static_cast<std::size_t>(rows.shape(0)));
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    pairs[k] = {rows.data()[2 * k], rows.data()[2 * k + 1]};
-  return pairs;
-}
 
 /// poses: (N, 4, 4), NaN where a scan has none.
 std::vector<UnalignedIsometry3d> poses_of(const DoubleArray& poses) {
@@ -38,13 +31,12 @@ std::vector<UnalignedIsometry3d> poses_of(const DoubleArray& poses) {
 }
 
 /// (N, 4, 4) poses, NaN where not known, or (source, target, pose, information or None) of each.
-std::vector<Odometry> odometry_of(const py::object& given) {
-  std::vector<Odometry> out;
+void set_odometry(const py::object& given, MapInput& input) {
   if (py::isinstance<py::array>(given)) {
-    return odometry_of_poses(poses_of(given.cast<DoubleArray>()));
+    input.world_from_scan = poses_of(given.cast<DoubleArray>());
+    return;
   }
-  const auto items = given.cast<py::list>();
-  for (const py::handle item : items) {
+  for (const py::handle item : given.cast<py::list>()) {
     const auto parts = item.cast<py::tuple>();
     Odometry edge;
     edge.source = parts[0].cast<std::uint32_t>();
@@ -54,22 +46,13 @@ std::vector<Odometry> odometry_of(const py::object& given) {
     if (!parts[3].is_none())
       edge.information = matrix_of<Eigen::Matrix<double, 6, 6>>(parts[3].cast<DoubleArray>(),
                                                                 "odometry information");
-    out.push_back(edge);
+    input.odometry.push_back(edge);
   }
-  return out;
 }
 
 std::vector<PreparedCloud> prepared_of(const py::list& clouds) {
   std::vector<PreparedCloud> out;
   for (const py::handle cloud : clouds) out.push_back(cloud.cast<const Cloud&>().prepared);
-  return out;
-}
-
-py::array_t<double> poses_array(const std::vector<UnalignedIsometry3d>& poses) {
-  py::array_t<double> out({static_cast<py::ssize_t>(poses.size()), py::ssize_t(4), py::ssize_t(4)});
-  double* next = out.mutable_data();
-  for (const UnalignedIsometry3d& pose : poses)
-    for (int k = 0; k < 16; ++k) *next++ = pose.matrix()(k / 4, k % 4);
   return out;
 }
 
@@ -137,30 +120,6 @@ void bind_audit(py::module_& m) {
         py::arg("islands"), py::arg("found"), py::arg("options"), py::arg("audit_options"));
 }
 
-/// clouds: of the pairs, audited; none: not audited.
-/// @return the map, its audit or None, and whether places look alike.
-py::tuple reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
-                         const Options options, const py::object& odometry, const Context& context,
-                         const py::list& clouds, const RegistrationOptions registration,
-                         const AuditOptions audit_options) {
-  const std::vector<PreparedCloud> prepared = prepared_of(clouds);
-  const std::vector<Pair> pairs = pairs_of(rows);
-  std::vector<RegistrationResult> values;
-  for (const py::handle result : results)
-    values.push_back(result.cast<const RegistrationResult&>());
-  const std::vector<Odometry> known = odometry_of(odometry);
-  if (!prepared.empty()) {
-    AuditedReconstruction out = interruptible([&] {
-      return reconstruct(context, prepared, pairs, values, options, known, registration,
-                         audit_options);
-    });
-    return py::make_tuple(std::move(out.map), std::move(out.audit), out.places_look_alike);
-  }
-  Reconstruction map =
-      interruptible([&] { return reconstruct_from_poses(scans, pairs, values, options, known); });
-  return py::make_tuple(std::move(map), py::none(), false);
-}
-
 py::dict report_of(const RefineReport& report) {
   py::dict out;
   out["pairs"] = report.pairs;
@@ -173,42 +132,46 @@ py::dict report_of(const RefineReport& report) {
   return out;
 }
 
-Surface surface_of_input(const Context& context, const py::tuple& cloud,
-                         const PrepareOptions registration) {
-  const Input input(cloud);
-  const py::gil_scoped_release release;
-  return surface_of(context, input.view, registration);
+/// results: of the pairs; None: they are aligned. progress: called with (step, done, total).
+py::dict reconstruct_set(const Context& context, const PythonSet& set,
+                         const std::optional<IndexArray>& pairs,
+                         const std::optional<std::vector<RegistrationResult>>& results,
+                         const py::object& odometry, const MapOptions options,
+                         const py::object& progress) {
+  MapInput input;
+  if (pairs) input.pairs = pairs_of(*pairs);
+  input.results = results;
+  set_odometry(odometry, input);
+  Teller tell(progress);
+  MapCallbacks callbacks;
+  callbacks.on_progress = [&](MapStep step, std::size_t done, std::size_t total) {
+    tell(static_cast<int>(step), done, total);
+  };
+  callbacks.should_stop = [&] { return !tell.check(); };
+  MapOfSet made;
+  tell.run([&] { made = reconstruct(context, set, input, options, callbacks); });
+  py::dict out;
+  out["scans"] = made.scans;
+  out["unusable"] = dict_of(made.unusable);
+  out["map"] = std::move(made.map);
+  out["audit"] = made.audit ? py::cast(std::move(*made.audit)) : py::none();
+  out["places_look_alike"] = made.places_look_alike;
+  out["refinement"] = made.refinement ? py::object(report_of(*made.refinement)) : py::none();
+  if (made.journal) made.journal->remove();
+  return out;
 }
 
-/// surfaces: None for scans that are left out. tell: called with the number of each iteration.
-py::dict refine_map(const Context& context, Reconstruction& map, const py::list& given,
-                    double voxel_size, const py::object& tell) {
-  std::vector<Surface> surfaces;
-  for (const py::handle surface : given)
-    surfaces.push_back(surface.is_none() ? Surface{} : surface.cast<const Surface&>());
-  reconstruction::RefineOptions options =
-      reconstruction::RefineOptions::for_depth_cameras(static_cast<float>(voxel_size));
-  options.threads = static_cast<int>(context.backend() == Backend::cpu ? context.threads() : 0);
-  std::exception_ptr failed;
-  options.should_stop = [&](int iteration) {
-    const py::gil_scoped_acquire acquire;
-    try {
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      if (!tell.is_none()) tell(iteration + 1);
-    } catch (...) {
-      failed = std::current_exception();
-    }
-    return failed != nullptr;
-  };
-  Reconstruction refined = map;  // which another thread may read meanwhile
-  RefineReport report;
-  {
-    const py::gil_scoped_release release;
-    report = refine(context, surfaces, refined, options);
-  }
-  map = std::move(refined);
-  if (failed) std::rethrow_exception(failed);
-  return report_of(report);
+/// Options of the Python function of that name.
+MapOptions map_options(const RegistrationOptions& registration, const Options& graph,
+                       const AuditOptions& audit, bool with_audit, bool with_refinement,
+                       const std::string& journal) {
+  MapOptions options = MapOptions::of(registration);
+  options.graph = graph;
+  options.audit = audit;
+  options.with_audit = with_audit;
+  options.with_refinement = with_refinement;
+  options.journal = journal;
+  return options;
 }
 
 py::list scans_list(const Reconstruction& map) {
@@ -235,23 +198,6 @@ py::list links_list(const Reconstruction& map) {
   for (const Link& link : weakest_links(map))
     out.append(py::make_tuple(link.scans, link.confidence, link.accepted, link.rejected));
   return out;
-}
-
-/// The result of a pair of which a table holds the pose, the score and the information only.
-RegistrationResult result_of_row(bool aligned, const py::object& pose, double score,
-                                 const py::object& information) {
-  RegistrationResult result;
-  result.status = aligned ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
-  result.reason = aligned ? RegistrationReason::none : RegistrationReason::confidence_too_low;
-  result.score = score;
-  if (pose.is_none()) return result;
-  result.has_candidate = true;
-  result.target_from_source.matrix() =
-      matrix_of<Eigen::Matrix4d>(pose.cast<DoubleArray>(), "target_from_source");
-  if (!information.is_none())
-    result.source_moments = CorrespondenceMoments::from_redwood(
-        matrix_of<Eigen::Matrix<double, 6, 6>>(information.cast<DoubleArray>(), "information"));
-  return result;
 }
 
 void bind_voxel_map(py::module_& m) {
@@ -307,19 +253,13 @@ void bind_reconstruction(py::module_& m) {
       .def_property_readonly("links", &links_list)
       .def_property_readonly("islands",
                              [](const Reconstruction& map) { return lists_of(map.islands); });
-  m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
-        py::arg("options"), py::arg("odometry"), py::arg("context"), py::arg("clouds"),
-        py::arg("registration"), py::arg("audit_options"));
+  py::class_<MapOptions>(m, "ReconstructOptions", "All options of a map of a set.")
+      .def(py::init(&map_options), py::arg("registration"), py::arg("graph"), py::arg("audit"),
+           py::arg("with_audit"), py::arg("with_refinement"), py::arg("journal"));
+  m.def("reconstruct_set", &reconstruct_set, py::arg("context"), py::arg("fragments"),
+        py::arg("pairs"), py::arg("results"), py::arg("odometry"), py::arg("options"),
+        py::arg("progress"));
   bind_audit(m);
-  m.def("refine_map", &refine_map, py::arg("context"), py::arg("map"), py::arg("surfaces"),
-        py::arg("voxel_size"), py::arg("tell"));
-  py::class_<Surface>(m, "Surface", "Points of a scan with their normals.");
-  m.def("surface_of", &surface_of_input, py::arg("context"), py::arg("cloud"),
-        py::arg("registration"));
-  m.def("surface_options", &surface_options, py::arg("registration"));
-  m.def("result_of_row", &result_of_row, py::arg("aligned"), py::arg("target_from_source"),
-        py::arg("score"), py::arg("information"));
-  m.attr("REFINE_ITERATIONS") = reconstruction::RefineOptions{}.iterations;
   bind_voxel_map(m);
 }
 

@@ -107,17 +107,16 @@ void bind_trajectory(py::module_& m) {
   m.def(
       "read_odometry",
       [](const std::string& path, const std::vector<int>& numbers,
-         const std::vector<std::string>& names, const std::string& folder,
-         const std::vector<int>& unusable) {
+         const std::vector<std::string>& names, const std::string& folder) -> py::object {
+        const auto known = cli::read_odometry(path, scans_of(numbers, names), folder);
+        if (!known.world_from_scan.empty()) return poses_array(known.world_from_scan);
         py::list out;
-        for (const auto& edge :
-             cli::read_odometry(path, scans_of(numbers, names), folder, unusable))
+        for (const auto& edge : known.odometry)
           out.append(py::make_tuple(edge.source, edge.target,
                                     array_of(edge.target_from_source.matrix()), py::none()));
         return out;
       },
-      py::arg("path"), py::arg("numbers"), py::arg("names"), py::arg("folder"),
-      py::arg("unusable"));
+      py::arg("path"), py::arg("numbers"), py::arg("names"), py::arg("folder"));
   m.def(
       "evaluate_trajectory",
       [](const DoubleArray& times, const DoubleArray& poses, const DoubleArray& true_times,

@@ -6,12 +6,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 
 from .._core import RegistrationResult
-from ..registration import ALIGNED
 
 
 def row_of(i: int, j: int, result: RegistrationResult) -> dict[str, Any]:
@@ -52,15 +49,3 @@ def table_of(rows: Sequence[dict[str, Any]]) -> pa.Table:
     """Rows, at least one, in the order given."""
     schema = pa.schema([(name, _type_of(name, value)) for name, value in rows[0].items()])
     return pa.Table.from_pylist(list(rows), schema=schema)
-
-
-def entries_of(
-    table: pa.Table, column: str, size: int, count: int
-) -> list[tuple[int, int, int, npt.NDArray[np.float64]]]:
-    """Blocks of a Redwood file: the matrices of the aligned pairs."""
-    aligned = table.filter(pa.compute.is_in(table["status"], pa.array(ALIGNED)))
-    i, j = aligned["i"].to_pylist(), aligned["j"].to_pylist()
-    matrices = [
-        np.asarray(values, np.float64).reshape(size, size) for values in aligned[column].to_pylist()
-    ]
-    return [(a, b, count, matrix) for a, b, matrix in zip(i, j, matrices)]
