@@ -43,7 +43,8 @@ class DocumentFile {
 /// Parses one value, with the limits of a document. Throws InvalidArgument.
 Json parse_json(const std::string& text);
 
-/// The last member of a document, an array of objects that are made one by one.
+/// The last member of a document, an array of objects that are made one by one, by several threads
+/// at once.
 struct DocumentList {
   const char* name;
   std::size_t size;

@@ -2,6 +2,7 @@
 #include "records/pair_store.hpp"
 
 #include <cstdlib>
+#include <mutex>
 
 #include "gpureg/error.hpp"
 #include "gpureg/sets/pair_journal.hpp"
@@ -74,9 +75,14 @@ void write_pairs(const std::string& path, const Json& head, const std::vector<Pa
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < pairs.size(); ++k)
     if (result(k).status != RegistrationStatus::skipped) places.push_back(k);
+  std::mutex reading;
+  const auto result_at = [&](std::size_t k) {
+    const std::lock_guard<std::mutex> lock(reading);
+    return result(k);
+  };
   const auto element = [&](std::size_t n) {
     const Pair& pair = pairs[places[n]];
-    const RegistrationResult done = result(places[n]);
+    const RegistrationResult done = result_at(places[n]);
     const io::ScanFile &i = folder.scans[pair.target], &j = folder.scans[pair.source];
     Json json = {{"i", i.number}, {"j", j.number}, {"name_i", i.name}, {"name_j", j.name}};
     json.update(pair_to_json(i.number, j.number, done));
