@@ -423,6 +423,39 @@ class TestCommand:
             gpureg.RegistrationOptions.from_voxel_size(0.05, quality=0),
         )
 
+    def test_pair_map_and_place_are_the_command_s(self, tmp_path):
+        folder, voxel_size = tmp_path / "scene", 0.06
+        folder.mkdir()
+        whole = room(7, 8000)
+        for k in range(4):
+            gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", moved(whole[k::4], pose(k)))
+        a, b = folder / "cloud_bin_0.ply", folder / "cloud_bin_1.ply"
+
+        def command(*arguments):
+            assert self.run(*arguments, "--voxel-size", voxel_size).returncode in (0, 1)
+
+        command("register", a, b, "--json", tmp_path / "pair.json")
+        command("reconstruct", folder, "-o", tmp_path / "map")
+        command("locate", a, tmp_path / "map/map.ply", "--json", tmp_path / "place.json")
+        pair = json.loads((tmp_path / "pair.json").read_text())["result"]
+        scene = json.loads((tmp_path / "map/reconstruction.json").read_text())
+        place = json.loads((tmp_path / "place.json").read_text())["scans"][0]
+
+        result = gpureg.register(a, b, voxel_size)
+        assert pair["target_from_source"] == result.target_from_source.ravel().tolist()
+        assert pair["score"] == result.score
+        options = gpureg.RegistrationOptions.from_voxel_size(voxel_size)
+        made = gpureg.reconstruct(folder, options=options)
+        assert made.islands == scene["islands"] == [[0, 1, 2, 3]]
+        for scan, matrix in zip(scene["scans"], made.poses):
+            assert scan["island_from_scan"] == matrix.ravel().tolist()
+        map_options = gpureg.MapOptions.from_voxel_size(voxel_size)
+        place_map = gpureg.prepare_map(tmp_path / "map/map.ply", options=map_options)
+        found = gpureg.locate(a, place_map)
+        assert [entry["map_from_scan"] for entry in place["poses"]] == [
+            entry.map_from_scan.ravel().tolist() for entry in found.poses
+        ]
+
     def compare(self, folder, tmp_path, arguments, options):
         done = self.run(
             "batch",

@@ -157,18 +157,11 @@ class MapMaker {
   }
 
   std::vector<Pair> chosen_pairs() {
+    if (!input_.pairs) return options_.prune > 0 ? likely_pairs() : all_pairs(out_.scans.size());
     std::vector<Pair> pairs;
-    const auto scans = static_cast<std::uint32_t>(out_.scans.size());
-    if (input_.pairs) {
-      for (const Pair& pair : *input_.pairs)
-        if (usable(pair.source, pair.target))
-          pairs.push_back({place_of_[pair.source], place_of_[pair.target]});
-    } else if (options_.prune > 0) {
-      pairs = likely_pairs();
-    } else {
-      for (std::uint32_t i = 0; i < scans; ++i)
-        for (std::uint32_t j = i + 1; j < scans; ++j) pairs.push_back({j, i});
-    }
+    for (const Pair& pair : *input_.pairs)
+      if (usable(pair.source, pair.target))
+        pairs.push_back({place_of_[pair.source], place_of_[pair.target]});
     return pairs;
   }
 

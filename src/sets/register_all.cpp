@@ -84,6 +84,20 @@ struct Run {
 
 }  // namespace
 
+std::vector<Pair> all_pairs(std::size_t fragments) {
+  std::vector<Pair> pairs;
+  for (std::uint32_t i = 0; i < fragments; ++i)
+    for (std::uint32_t j = i + 1; j < fragments; ++j) pairs.push_back({j, i});
+  return pairs;
+}
+
+RunIdentity identity_of(const FragmentSet& fragments, const RegistrationOptions& options) {
+  RunIdentity run{RunIdentity::settings_of(options), {}};
+  for (std::size_t k = 0; k < fragments.size(); ++k)
+    run.clouds.push_back({fragments.name(k), fragments.fingerprint(k)});
+  return run;
+}
+
 void register_all(const Context& context, const std::vector<PreparedCloud>& clouds,
                   PairJournal& journal, const RegistrationOptions& options,
                   const std::optional<GravityPrior>& gravity, const SetCallbacks& callbacks) {

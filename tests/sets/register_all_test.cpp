@@ -14,7 +14,7 @@ constexpr std::size_t kPairs = kScans * (kScans - 1) / 2;
 
 /// In memory.
 PairJournal journal_of(const SmallSet& set) {
-  return PairJournal("", set.identity(quick_options()), all_pairs(kScans),
+  return PairJournal("", identity_of(set, quick_options()), all_pairs(kScans),
                      PairJournal::Mode::fresh);
 }
 
@@ -75,7 +75,7 @@ TEST(RegisterAll, GoesOnWhereItWasStopped) {
   EXPECT_TRUE(results_of(parts) == results_of(whole));
   EXPECT_THROW(
       register_all({Context::cpu(1)}, set,
-                   *std::make_unique<PairJournal>("", set.identity(quick_options()),
+                   *std::make_unique<PairJournal>("", identity_of(set, quick_options()),
                                                   all_pairs(kScans), PairJournal::Mode::fresh),
                    quick_options(), kFragmentMemory,
                    [](std::size_t, std::size_t) -> bool { throw IoError("enough"); }),

@@ -32,25 +32,11 @@ class SmallSet : public FragmentSet {
     return LoadedCloud(clouds_[k]);
   }
 
-  RunIdentity identity(const RegistrationOptions& options) const {
-    RunIdentity run{RunIdentity::settings_of(options), {}};
-    for (std::size_t k = 0; k < size(); ++k)
-      run.clouds.push_back({name(k), fingerprint_of(clouds_[k].view())});
-    return run;
-  }
-
   std::set<std::size_t> bad;  // that cannot be read
 
  private:
   std::vector<PointCloud> clouds_;
 };
-
-inline std::vector<Pair> all_pairs(std::uint32_t scans) {
-  std::vector<Pair> pairs;
-  for (std::uint32_t i = 0; i < scans; ++i)
-    for (std::uint32_t j = i + 1; j < scans; ++j) pairs.push_back({j, i});
-  return pairs;
-}
 
 inline RegistrationOptions quick_options() {
   return RegistrationOptions::from_voxel_size(0.15f).with_quality(0);

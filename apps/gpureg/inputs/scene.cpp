@@ -9,6 +9,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/sets/register_all.hpp"
 #include "inputs/cloud_file.hpp"
 #include "run/interrupt.hpp"
 #include "run/progress.hpp"
@@ -168,13 +169,8 @@ PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
 }
 
 std::vector<Pair> choose_pairs(const FragmentFolder& folder, const std::string& pairs, bool quiet) {
+  if (pairs == "all") return all_pairs(folder.numbers.size());
   std::vector<Pair> chosen;
-  const auto size = static_cast<std::uint32_t>(folder.numbers.size());
-  if (pairs == "all") {
-    for (std::uint32_t i = 0; i < size; ++i)
-      for (std::uint32_t j = i + 1; j < size; ++j) chosen.push_back({j, i});
-    return chosen;
-  }
   const auto listed = io::read_pairs(pairs, folder.all());
   std::size_t repeated = 0;
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;

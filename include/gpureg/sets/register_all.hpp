@@ -16,6 +16,12 @@
 /// Component `sets`: all pairs of a set, without losing work.
 namespace gpureg {
 
+/// Every pair of a set, each with the later fragment as its source.
+std::vector<Pair> all_pairs(std::size_t fragments);
+
+/// What a run of a set is of. Reads the fragments for their fingerprints.
+RunIdentity identity_of(const FragmentSet& fragments, const RegistrationOptions& options = {});
+
 /// Aligns the pairs of a journal that it lacks, of clouds in memory.
 /// @param clouds by the indices of the pairs.
 /// @param gravity a prior of all pairs.
