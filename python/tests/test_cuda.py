@@ -49,7 +49,7 @@ def test_same_bits_as_the_cpu(source, target, tmp_path):
     assert len(set(results)) == 1
     clouds, keywords = (
         [room(k % 3, 1500) for k in range(8)],
-        {"options": few(2000), "progress": False, "chunk_size": 5},
+        {"options": few(2000), "progress": False},
     )
     pytest.importorskip("pyarrow")
     runs = [
