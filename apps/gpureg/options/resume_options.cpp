@@ -58,7 +58,7 @@ void ResumeOptions::with(const std::string& journal, const std::function<void()>
   } catch (const OtherRun& error) {
     throw IoError("cannot resume from " + journal + ": " + error.what() + ", or call " + anew);
   } catch (const DamagedJournal& error) {
-    throw IoError("cannot resume from " + journal + ": " + error.what() + "; call " + anew);
+    throw IoError(std::string(error.what()) + "; call " + anew);
   }
 }
 
