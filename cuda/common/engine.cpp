@@ -316,6 +316,30 @@ void CudaEngine::align_on_lane(std::size_t lane, Span<const PairInput> pairs,
   share_time(outcomes);
 }
 
+std::vector<FeatureMatches> CudaEngine::match(Span<const PairInput> pairs,
+                                              const RegistrationOptions& options) {
+  const Lanes::Held held = has_budget() ? lanes_.all() : lanes_.any();
+  const DeviceScope scope(device());
+  std::vector<FeatureMatches> out;
+  for_runs_within_budget(pairs, [&](std::size_t begin, std::size_t end) {
+    Exec& exec = held.exec();
+    exec.begin();
+    const ResidentPairs resident = bring(exec, {pairs.data + begin, end - begin});
+    const WaitOnFailure wait(held);
+    const MatchSets matches = merge_matches(exec, span_of(resident.views), options);
+    const std::size_t room = matches.room.total();
+    const std::uint32_t* const count = exec.download(matches.count.data(), end - begin);
+    const std::uint32_t* const source = exec.download(matches.columns().source, room);
+    const std::uint32_t* const target = exec.download(matches.columns().target, room);
+    exec.synchronize();
+    for (std::size_t p = 0; p < end - begin; ++p) {
+      const std::uint32_t first = matches.room.offset[p], last = first + count[p];
+      out.push_back({{source + first, source + last}, {target + first, target + last}});
+    }
+  });
+  return out;
+}
+
 void CudaEngine::verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
                         const RegistrationOptions& options, bool refine,
                         Span<PairOutcome> outcomes) {

@@ -43,6 +43,8 @@ class CudaEngine final : public DeviceEngine {
   /// On one lane; other threads may use the others at the same time. Requires !has_budget().
   void align_on_lane(std::size_t lane, Span<const PairInput> pairs,
                      const RegistrationOptions& options, Span<PairOutcome> outcomes);
+  std::vector<FeatureMatches> match(Span<const PairInput> pairs,
+                                    const RegistrationOptions& options) override;
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) override;
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override;

@@ -139,6 +139,12 @@ class EngineOfMany final : public DeviceEngine {
     });
   }
 
+  /// On the first device: the matches of a few pairs take a millisecond.
+  std::vector<FeatureMatches> match(Span<const PairInput> pairs,
+                                    const RegistrationOptions& options) override {
+    return engines_[0]->match(pairs, options);
+  }
+
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine,
               Span<PairOutcome> outcomes) override {

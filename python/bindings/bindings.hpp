@@ -19,6 +19,7 @@ void bind_prior(py::module_& m);
 void bind_align(py::module_& m);
 void bind_verification(py::module_& m);
 void bind_loop_consistency(py::module_& m);
+void bind_scale(py::module_& m);
 void bind_time_budget(py::module_& m);
 void bind_voxel_size(py::module_& m);
 void bind_files(py::module_& m);

@@ -15,6 +15,7 @@ PYBIND11_MODULE(_core, m) {
   bind_align(m);
   bind_verification(m);
   bind_loop_consistency(m);
+  bind_scale(m);
   bind_time_budget(m);
   bind_voxel_size(m);
   bind_files(m);

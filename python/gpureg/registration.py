@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ._core import (
     RegistrationOptions,
     RegistrationPrior,
     RegistrationResult,
+    ScaledResult,
     TimedResult,
     VoxelSizeSuggestion,
 )
@@ -229,6 +230,104 @@ def align_batch(
     return results
 
 
+def _scale_range(scale: Any) -> tuple[float, float]:
+    """(least, most) of a scale; (0, 0): free."""
+    if isinstance(scale, str):
+        if scale != "free":
+            raise ValueError(f"scale: expected 'free', a number or (least, most), got {scale!r}")
+        return 0.0, 0.0
+    if isinstance(scale, (int, float, np.integer, np.floating)) and not isinstance(scale, bool):
+        ends = [float(scale), float(scale)]
+    elif isinstance(scale, (tuple, list)) and len(scale) == 2:
+        ends = [float(end) for end in scale]
+    else:
+        raise TypeError(f"scale: expected 'free', a number or (least, most), got {scale!r}")
+    for end in ends:
+        if not (np.isfinite(end) and end > 0):
+            raise InvalidArgument(f"scale: {scale!r}, expected finite numbers > 0")
+    if ends[0] > ends[1]:
+        raise InvalidArgument(f"scale: {scale!r}, expected the smaller end first")
+    return ends[0], ends[1]
+
+
+def align_scaled_batch(
+    clouds: Sequence[Any],
+    pairs: Any,
+    *,
+    scale: Any = "free",
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
+) -> list[ScaledResult]:
+    """Find scale and pose of many pairs of clouds whose scales differ by unknown factors.
+
+    Parameters
+    ----------
+    clouds : sequence
+        Of whatever `prepare` takes as points, on the host.
+    pairs : (M, 2) integer array or list of pairs
+        Rows (source, target): indices into clouds.
+    scale : "free", (least, most) or float
+        Lengths of the target's unit per unit of the source.
+    options : RegistrationOptions, optional
+        Voxel size and all lengths are in the unit of the targets.
+    context : Context, optional
+
+    Returns
+    -------
+    list of ScaledResult
+        One per pair, in the order of pairs.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = np.random.default_rng(1).random((2000, 3))
+    >>> [result] = gpureg.align_scaled_batch([cloud / 2, cloud], [(0, 1)], scale=(1.5, 3))
+    >>> result.aligned, round(result.scale, 2)
+    (True, 2.0)
+    """
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    least, most = _scale_range(scale)
+    clouds = several(clouds, "clouds")
+    entries = index_pairs(pairs, "pairs", len(clouds))
+    inputs = [
+        core_cloud(cloud, None, None, None, options.prepare, f"clouds[{k}]")
+        for k, cloud in enumerate(clouds)
+    ]
+    return _core.align_scaled_batch(
+        context_of(context), inputs, [(int(s), int(t)) for s, t in entries], least, most, options
+    )
+
+
+@overload
+def register(
+    source: Any,
+    target: Any,
+    voxel_size: float | Literal["auto"] | None = ...,
+    *,
+    quality: int | None = ...,
+    seed: int | None = ...,
+    prior: RegistrationPrior | None = ...,
+    scale: None = ...,
+    source_viewpoint: Any = ...,
+    target_viewpoint: Any = ...,
+    options: RegistrationOptions | None = ...,
+    time_budget_ms: float | None = ...,
+    context: Context | None = ...,
+) -> RegistrationResult: ...
+@overload
+def register(
+    source: Any,
+    target: Any,
+    voxel_size: float | Literal["auto"] | None = ...,
+    *,
+    quality: int | None = ...,
+    seed: int | None = ...,
+    scale: Any,
+    source_viewpoint: Any = ...,
+    target_viewpoint: Any = ...,
+    options: RegistrationOptions | None = ...,
+    context: Context | None = ...,
+) -> ScaledResult: ...
 def register(
     source: Any,
     target: Any,
@@ -237,12 +336,13 @@ def register(
     quality: int | None = None,
     seed: int | None = None,
     prior: RegistrationPrior | None = None,
+    scale: Any = None,
     source_viewpoint: Any = None,
     target_viewpoint: Any = None,
     options: RegistrationOptions | None = None,
     time_budget_ms: float | None = None,
     context: Context | None = None,
-) -> RegistrationResult:
+) -> RegistrationResult | ScaledResult:
     """Prepare two clouds and align them.
 
     Parameters
@@ -258,6 +358,10 @@ def register(
         Same seed, same bits, for any threads and backend.
     prior : RegistrationPrior, optional
         What is known of the pose, in the frames of source and target; see `align`.
+    scale : "free", (least, most) or float, optional
+        Lengths of the target's unit per unit of the source. "free": searched; (least, most):
+        searched in that range. voxel_size is in the target's unit. Not together with a prior or a
+        time budget.
     source_viewpoint, target_viewpoint : (3,) or (V, 3) array, "auto", "none" or "model", optional
         Where the clouds were seen from: viewpoints of `prepare`.
     options : RegistrationOptions, optional
@@ -269,9 +373,9 @@ def register(
 
     Returns
     -------
-    RegistrationResult
-        ``target_from_source`` moves points of the source into the target's frame:
-        ``p_target = R p_source + t``. As a condition, a result is its ``aligned``. Where it is
+    RegistrationResult, or ScaledResult where scale is given
+        ``target_from_source`` moves points of the source into the target's frame, with the scale
+        in it: ``p_target = R p_source + t``. As a condition, a result is its ``aligned``. Where it is
         not, ``explanation`` and ``advice`` say why and what to try.
 
     Warns
@@ -294,6 +398,9 @@ def register(
     checked(prior, RegistrationPrior, "prior")
     if prior is not None and time_budget_ms is not None:
         raise TypeError("prior: not together with time_budget_ms")
+    if scale is not None and not (prior is None and time_budget_ms is None):
+        raise TypeError("scale: not together with a prior or time_budget_ms")
+    ends = None if scale is None else _scale_range(scale)
     if options is not None and not (voxel_size is None and quality is None and seed is None):
         raise TypeError("options: give either options, or voxel_size, quality and seed")
     if time_budget_ms is not None and quality is not None:
@@ -302,7 +409,8 @@ def register(
         time_budget_ms = milliseconds_of(time_budget_ms, "time_budget_ms")
     if options is None:
         if isinstance(voxel_size, str) and voxel_size == "auto":
-            suggestion = suggest_voxel_size([source, target])
+            # Of a source in another unit nothing follows for the target's.
+            suggestion = suggest_voxel_size([source, target] if ends is None else [target])
             if suggestion.reason != "none":
                 raise ValueError(f"voxel_size: 'auto', but {suggestion.explanation}")
             voxel_size = suggestion.voxel_size
@@ -317,13 +425,17 @@ def register(
             options.seed = seed
     context = context_of(context)
     clouds = []
-    device = context.backend == "cuda"
+    device = context.backend == "cuda" and ends is None
     for cloud, viewpoint, name in (
         (source, source_viewpoint, "source"),
         (target, target_viewpoint, "target"),
     ):
         clouds.append(core_cloud(cloud, None, None, viewpoint, options.prepare, name, device))
     options.validate()
+    if ends is not None:
+        return _core.align_scaled_batch(
+            context, clouds, [(0, 1)], *ends, options, ["source", "target"]
+        )[0]
     try:
         a, b = _core.prepare_batch(context, clouds, options.prepare, ["source", "target"])
     except InvalidArgument as error:

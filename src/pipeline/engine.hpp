@@ -13,6 +13,11 @@ namespace gpureg {
 
 enum class Backend;
 
+/// Points of both clouds whose features match, in pseudorandom order.
+struct FeatureMatches {
+  std::vector<std::uint32_t> source, target;
+};
+
 /// Private interface between the public API (src/api) and the backends (src/cpu, cuda).
 /// Thread-safe: calls of several threads share the backend or wait for it.
 class Engine {
@@ -40,6 +45,9 @@ class Engine {
   }
   virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options,
                      Span<PairOutcome> outcomes) = 0;
+  /// The feature matches that align() starts with (RegistrationMethod::compatibility).
+  virtual std::vector<FeatureMatches> match(Span<const PairInput> pairs,
+                                            const RegistrationOptions& options) = 0;
   /// Evidence of given poses, one entry for each pair; refine: they are refined before.
   virtual void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
                       const RegistrationOptions& options, bool refine,

@@ -43,6 +43,10 @@ class IdleHostEngine final : public Engine {
     if (before_align) before_align(call);
     cpu_->align(pairs, options, outcomes);
   }
+  std::vector<FeatureMatches> match(Span<const PairInput> pairs,
+                                    const RegistrationOptions& options) override {
+    return cpu_->match(pairs, options);
+  }
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine,
               Span<PairOutcome> outcomes) override {

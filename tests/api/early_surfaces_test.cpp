@@ -45,6 +45,9 @@ class WatchedEngine final : public Engine {
     return states;
   }
   void align(Span<const PairInput>, const RegistrationOptions&, Span<PairOutcome>) override {}
+  std::vector<FeatureMatches> match(Span<const PairInput>, const RegistrationOptions&) override {
+    return {};
+  }
   void verify(Span<const PairInput>, const std::vector<PosesOfPair>&, const RegistrationOptions&,
               bool, Span<PairOutcome>) override {}
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays>) override {

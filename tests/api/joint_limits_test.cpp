@@ -38,6 +38,11 @@ class LimitedEngine final : public Engine {
     check(pairs.size);
     cpu_->align(pairs, options, outcomes);
   }
+  std::vector<FeatureMatches> match(Span<const PairInput> pairs,
+                                    const RegistrationOptions& options) override {
+    check(pairs.size);
+    return cpu_->match(pairs, options);
+  }
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine,
               Span<PairOutcome> outcomes) override {

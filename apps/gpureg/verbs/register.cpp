@@ -15,6 +15,7 @@
 #include "gpureg/mesh.hpp"
 #include "gpureg/overlay.hpp"
 #include "gpureg/registration.hpp"
+#include "gpureg/scale.hpp"
 #include "gpureg/time_budget.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "inputs/cloud_file.hpp"
@@ -26,6 +27,7 @@
 #include "options/knowledge_options.hpp"
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
+#include "options/scale_option.hpp"
 #include "pictures/before_after.hpp"
 #include "pictures/image.hpp"
 #include "records/pose_text.hpp"
@@ -47,6 +49,8 @@ struct RegisterOptions {
   bool refine_initial = false, ignore_alternatives = false;
   ViewpointChoice source_viewpoint, target_viewpoint;
   UpChoice up;
+  ScaleChoice scale;
+  std::optional<ScaledResult> scaled;  // where --scale was given
   // Of a pair that is not aligned: questions, and what is known to be wrong.
   std::string other_units, perhaps_other_units, inverted, not_finite;
 };
@@ -85,7 +89,8 @@ std::string not_finite(const RegistrationResult& r, const PrepareStatistics& sou
 }
 
 std::string explained(const RegisterOptions& o, const RegistrationResult& r) {
-  return explain(r) + (o.not_finite.empty() ? "" : ": " + o.not_finite);
+  return (o.scaled ? explain(*o.scaled) : explain(r)) +
+         (o.not_finite.empty() ? "" : ": " + o.not_finite);
 }
 
 /// A pose that was given, and brings next to nothing together, may be of another convention.
@@ -124,7 +129,8 @@ void print_reason(const RegisterOptions& o, const RegistrationResult& r) {
 void note_pair(const RegisterOptions& o, const PointCloud& source, const PointCloud& target,
                bool aligned) {
   // Of a pair that is not aligned, it is what to try.
-  const std::string units = aligned ? question_units(source.view(), target.view()) : std::string();
+  const std::string units =
+      aligned && !o.scaled ? question_units(source.view(), target.view()) : std::string();
   for (const std::string& note : {units, o.method.suggestion_text({source.view(), target.view()})})
     if (!note.empty()) std::cerr << "gpureg: note: " << note << std::endl;
   std::error_code ignored;
@@ -163,6 +169,23 @@ void note_little_overlap(const RegistrationResult& r) {
               << " % only under this pose: look at it (--image) before you rely on it" << std::endl;
 }
 
+/// target_from_source as it is printed and written: with the scale in it.
+Eigen::Matrix4d pose_matrix(const RegisterOptions& o, const RegistrationResult& r) {
+  return o.scaled ? o.scaled->similarity() : Eigen::Matrix4d(r.target_from_source.matrix());
+}
+
+void print_scale(const ScaledResult& scaled) {
+  std::cout << "scale    " << significant(scaled.scale, 6) << " ("
+            << to_string(scaled.scale_status);
+  if (scaled.scale_deviation > 0)
+    std::cout << ", standard deviation " << significant(100 * scaled.scale_deviation, 2) << " %";
+  std::cout << ")";
+  for (std::size_t k = 1; k < scaled.candidates.size(); ++k)
+    std::cout << (k == 1 ? "; also tried " : ", ") << significant(scaled.candidates[k].scale, 3)
+              << " (confidence " << fixed(scaled.candidates[k].confidence, 3) << ")";
+  std::cout << "\n";
+}
+
 void print_report(const RegisterOptions& o, const Context& context, const PreparedCloud& source,
                   const PreparedCloud& target, const RegistrationResult& r) {
   const RegistrationStatistics& s = r.statistics;
@@ -173,10 +196,11 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
             << "backend  " << context.description() << "\n"
             << "status   " << to_string(r.status);
   print_reason(o, r);
+  if (o.scaled && o.scaled->scale_status != ScaleStatus::none) print_scale(*o.scaled);
   if (r.has_candidate) {
     std::cout << (r.aligned() ? "target_from_source\n" : "best candidate, target_from_source\n")
-              << pose_text(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
-              << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
+              << pose_text(pose_matrix(o, r)) << "score    " << fixed(r.score, 3) << ", inliers "
+              << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
               << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << "\n";
     if (r.equivalent_poses() > 1)
       std::cout << "symmetry " << r.equivalent_poses() << " equivalent poses, confidence "
@@ -229,6 +253,18 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
   json["source"] = {{"file", o.source}, {"prepare", to_json(source.statistics())}};
   json["target"] = {{"file", o.target}, {"prepare", to_json(target.statistics())}};
   json["result"] = to_json(result, "target_from_source");
+  if (o.scaled) {
+    Json& out = json["result"];
+    out["target_from_source"] =
+        result.has_candidate ? to_json(Eigen::MatrixXd(pose_matrix(o, result))) : Json(nullptr);
+    out["scale"] = o.scaled->scale;
+    out["scale_status"] = to_string(o.scaled->scale_status);
+    out["scale_deviation"] = o.scaled->scale_deviation;
+    out["scale_information"] = to_json(Eigen::MatrixXd(o.scaled->information));
+    out["scales"] = Json::array();
+    for (const ScaleCandidate& c : o.scaled->candidates)
+      out["scales"].push_back({{"scale", c.scale}, {"confidence", c.confidence}});
+  }
   json["result"]["explanation"] = explained(o, result);
   json["result"]["advice"] = next_step(o, result.reason);
   json["result"]["information_redwood"] = to_json(result.source_moments.information_redwood());
@@ -262,13 +298,15 @@ std::string inverted(RegisterOptions o, const Context& context, const PreparedCl
          "; expected target_from_source, which moves points of " + o.source + " onto " + o.target;
 }
 
-/// Both clouds. A mesh is sampled at the spacing of the other cloud.
+/// Both clouds. A mesh is sampled at the spacing of the other cloud, if they have one unit.
 std::pair<PointCloud, PointCloud> read_clouds(const RegisterOptions& o) {
   const bool source = io::is_mesh(o.source), target = io::is_mesh(o.target);
   std::pair<PointCloud, PointCloud> clouds;
   if (!source) clouds.first = read_cloud(o.source, 0, MeshNote::print);
   if (!target) clouds.second = read_cloud(o.target, 0, MeshNote::print);
-  const auto spacing = [](const PointCloud& other) {
+  const bool one_unit = o.scale.range().is_known() && o.scale.range().least == 1;
+  const auto spacing = [&](const PointCloud& other) {
+    if (!one_unit) return 0.0;
     return median_spacing(finite_points(other.points), 1);
   };
   if (source)
@@ -294,8 +332,19 @@ void check_initial(const RegisterOptions& o) {
                           " does not have");
 }
 
+/// What --scale does not go with.
+void check_scale(const RegisterOptions& o) {
+  if (!o.scale.given()) return;
+  o.scale.range();
+  for (const auto& [given, name] :
+       {std::pair(!o.initial.empty(), "--initial"),
+        std::pair(o.time_budget.has_value(), "--time-budget"), std::pair(!o.up.empty(), "--up")})
+    if (given) throw InvalidArgument(std::string("--scale and ") + name + " do not go together");
+}
+
 int run(RegisterOptions o) {
   check_initial(o);
+  check_scale(o);
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   if (o.time_budget && !(*o.time_budget > 0 && std::isfinite(*o.time_budget)))
     throw InvalidArgument("--time-budget is " + significant(*o.time_budget, 6) +
@@ -321,10 +370,25 @@ int run(RegisterOptions o) {
   o.target_viewpoint.check_cloud("--target-viewpoint", target_cloud, o.target);
   o.source_viewpoint.apply(source_cloud);
   o.target_viewpoint.apply(target_cloud);
-  o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
-                             o.source + " and " + o.target);
+  const ScaleRange scale = o.scale.range();
+  if (scale.is_known()) {
+    if (o.scale.given()) scale_cloud(source_cloud, scale.least);
+    o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
+                               o.source + " and " + o.target);
+  } else {
+    o.method.choose_voxel_size({target_cloud.view()}, o.target);
+  }
   const RegistrationOptions options = o.method.registration();
   o.method.note_calibration();
+  if (!scale.is_known()) {
+    o.scaled = align_scaled(context, o.source_viewpoint.view(source_cloud),
+                            o.target_viewpoint.view(target_cloud), scale, options);
+    // Without a scale, the report counts points at that of equal extents.
+    const double none = extent_of(target_cloud.points) / extent_of(source_cloud.points);
+    scale_cloud(source_cloud, o.scaled->scale_status != ScaleStatus::none ? o.scaled->scale
+                              : none > 0 && std::isfinite(none)           ? none
+                                                                          : 1.0);
+  }
   const auto asking_pair = [&](const auto& action) {
     return asking(o, source_cloud, target_cloud, action);
   };
@@ -349,18 +413,27 @@ int run(RegisterOptions o) {
   if (o.method.automatic_voxel_size)
     note_few_points({{o.source, source.size()}, {o.target, target.size()}});
   TimedResult timed;
-  if (o.time_budget)
+  if (o.scaled)
+    timed.result = o.scaled->result;
+  else if (o.time_budget)
     timed = align_within(context, source, target, *o.time_budget, options);
   else
     timed.result = o.initial.empty() ? align(context, source, target, prior, options)
                                      : verify(o, context, source, target, initial, options);
   const RegistrationResult& result = timed.result;
-  if (!result.aligned()) {
+  if (o.scale.given() && !o.scaled) {
+    o.scaled.emplace();
+    o.scaled->scale = scale.least;
+    o.scaled->scale_status = ScaleStatus::known;
+    o.scaled->result = result;
+  }
+  if (!result.aligned())
+    o.not_finite = not_finite(result, source.statistics(), target.statistics());
+  if (!result.aligned() && !o.scale.given()) {
     o.other_units = question_units(source_cloud.view(), target_cloud.view());
     // Parts of scenes differ by the ratios of feet, inches and centimetres, too.
     o.perhaps_other_units =
         question_units(source_cloud.view(), target_cloud.view(), kLeastUnitRatio);
-    o.not_finite = not_finite(result, source.statistics(), target.statistics());
     if (!o.initial.empty() && source.size() > 0 && target.size() > 0)
       o.inverted = inverted(o, context, source, target, initial, options, result.score);
   }
@@ -426,6 +499,7 @@ void add_register(CommandLine& line) {
           "its normals point outwards; auto: the file, or the origin if the surfaces agree with it")
       .show_default();
   verb.option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET").show_default();
+  o->scale.add_to(verb);
   o->up.add_to(verb, "both clouds", "SOURCE", "TARGET");
   verb.option("--json", o->json, "Write options, result, counts and times");
   verb.option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");

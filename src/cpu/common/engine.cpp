@@ -54,6 +54,16 @@ class CpuEngine final : public Engine {
       pipeline::align_by_quadruples(exec_, span_of(views), options, outcomes);
   }
 
+  std::vector<FeatureMatches> match(Span<const PairInput> pairs,
+                                    const RegistrationOptions& options) override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const std::vector<PairView> views = views_of(pairs);
+    std::vector<FeatureMatches> out;
+    for (MatchSet& matches : merge_matches(exec_, span_of(views), options))
+      out.push_back({std::move(matches.source), std::move(matches.target)});
+    return out;
+  }
+
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine,
               Span<PairOutcome> outcomes) override {

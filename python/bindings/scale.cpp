@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/scale.hpp"
+
+#include <pybind11/stl.h>
+
+#include "cloud_input.hpp"
+#include "interrupt.hpp"
+
+namespace gpureg::python {
+
+void bind_scale(py::module_& m) {
+  using S = ScaledResult;
+  py::class_<S>(m, "ScaledResult", "A similarity: result of an alignment with unknown scale.")
+      .def_property_readonly(
+          "aligned", [](const S& s) { return s.aligned(); }, "A similarity is reported.")
+      .def("__bool__", [](const S& s) { return s.aligned(); })
+      .def_property_readonly(
+          "target_from_source", [](const S& s) { return array_of(s.similarity()); },
+          "(4, 4): p_target = M p_source; the upper left 3 x 3 is the rotation times scale.")
+      .def_readonly("scale", &S::scale, "Lengths of the target's unit per unit of the source.")
+      .def_property_readonly(
+          "scale_status", [](const S& s) { return to_string(s.scale_status); },
+          "'known', 'found', 'ambiguous', 'not_observable' or 'none'.")
+      .def_readonly("scale_deviation", &S::scale_deviation,
+                    "Standard deviation of scale as a fraction of it; 0: known.")
+      .def_property_readonly(
+          "information", [](const S& s) { return array_of(s.information); },
+          "(7, 7), of rotation (radians), translation and logarithm of the scale, about the centre "
+          "of the points in common.")
+      .def_property_readonly(
+          "confidence", [](const S& s) { return s.result.symmetry_confidence(); },
+          "Probability that scale and pose are correct.")
+      .def_property_readonly(
+          "candidates",
+          [](const S& s) {
+            std::vector<std::pair<double, double>> out;
+            for (const ScaleCandidate& c : s.candidates) out.emplace_back(c.scale, c.confidence);
+            return out;
+          },
+          "(scale, confidence) of each distinct scale, the most confident first.")
+      .def_property_readonly(
+          "explanation", [](const S& s) { return explain(s); }, "One sentence.")
+      .def_readonly("result", &S::result,
+                    "RegistrationResult of the source multiplied by scale: its pose is rigid.")
+      .def("__repr__", [](const S& s) {
+        return "<gpureg.ScaledResult, " + std::string(to_string(s.result.status)) + ", scale " +
+               py::repr(py::float_(s.scale)).cast<std::string>() + " (" +
+               to_string(s.scale_status) + ")>";
+      });
+  m.def(
+      "align_scaled_batch",
+      [](const Context& context, const py::sequence& clouds,
+         const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs, double least,
+         double most, const RegistrationOptions options, const std::vector<std::string>& names) {
+        std::vector<Input> inputs;
+        std::vector<PointCloudView> views;
+        for (const py::handle cloud : clouds) {
+          inputs.emplace_back(cloud.cast<py::tuple>());
+          if (inputs.back().on_device)
+            throw py::type_error("clouds on a device: not with a scale that is searched");
+          views.push_back(inputs.back().view);
+        }
+        std::vector<Pair> entries;
+        for (const auto& [source, target] : pairs) entries.push_back({source, target});
+        return interruptible([&] {
+          return align_scaled_batch(context, views, entries, {least, most}, options, {}, names);
+        });
+      },
+      py::arg("context"), py::arg("clouds"), py::arg("pairs"), py::arg("least"), py::arg("most"),
+      py::arg("options"), py::arg("names") = std::vector<std::string>());
+}
+
+}  // namespace gpureg::python
