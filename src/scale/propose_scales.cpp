@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t kScales = 4;
 /// Support of the last of them, as a share of that of the first.
 constexpr double kLeastSupport = 0.4;
-/// Proposals whose scales differ by less are one: what a coarse consensus cannot tell apart.
-constexpr double kSame = 0.06;
+/// Proposals whose scales differ by less are one: refinement leads them to the same scale.
+constexpr double kSame = 0.1;
 /// By how much a proposal may lie outside the range that was asked for: its error.
 constexpr double kOutside = 0.04;
 

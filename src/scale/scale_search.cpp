@@ -18,8 +18,9 @@ constexpr float kReach = 2;
 constexpr float kReachOfSource = 1.5f * kReach;
 /// A scale that refinement changes by less is not prepared again.
 constexpr double kSettled = 0.002;
-/// Largest change that refinement may make: beyond, it has lost the pose.
-constexpr double kMostChange = 0.12;
+/// Largest change that refinement may make: beyond, it has lost the pose. From a sixth off it still
+/// finds the scale.
+constexpr double kMostChange = 0.3;
 constexpr int kRounds = 3;
 /// Confidence as a share of that of the first, below which a scale is not refined.
 constexpr double kLeastChance = 0.05;

@@ -49,6 +49,22 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
   return json;
 }
 
+Json scale_to_json(const ScaledResult& found, const char* pose_name) {
+  Json out;
+  out[pose_name] = nullptr;
+  if (found.result.has_candidate) out[pose_name] = to_json(found.similarity());
+  out["scale"] = nullptr;
+  if (found.scale_status != ScaleStatus::none) out["scale"] = found.scale;
+  out["scale_status"] = to_string(found.scale_status);
+  out["scale_deviation"] = found.scale_deviation;
+  out["scale_information"] = to_json(found.information);
+  out["scales"] = Json::array();
+  for (const ScaleCandidate& c : found.candidates)
+    out["scales"].push_back({{"scale", c.scale}, {"confidence", c.confidence}});
+  if (!found.aligned()) out["explanation"] = explain(found);
+  return out;
+}
+
 Json environment(const Context& context) {
   return {{"version", GPUREG_VERSION},
           {"backend", to_string(context.backend())},

@@ -6,6 +6,7 @@
 
 #include "gpureg/context.hpp"
 #include "gpureg/result.hpp"
+#include "gpureg/scale.hpp"
 #include "json/fields_json.hpp"
 
 namespace gpureg::cli {
@@ -16,6 +17,10 @@ Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
 /// status, reason, explanation (of what is not aligned), score, inlier_ratio, inlier_rmse, the pose
 /// under the given name (null where there is none), statistics, ms.
 Json to_json(const RegistrationResult& result, const char* pose_name);
+
+/// The pose under the given name with the scale in it (null where there is none), scale,
+/// scale_status, scale_deviation, scale_information (7 x 7), scales, explanation.
+Json scale_to_json(const ScaledResult& found, const char* pose_name);
 
 /// Version and backend of the run.
 Json environment(const Context& context);

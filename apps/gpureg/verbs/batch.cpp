@@ -10,22 +10,26 @@
 #include <string>
 
 #include "command.hpp"
+#include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/sets/register_all.hpp"
 #include "inputs/scene.hpp"
 #include "json/fields_json.hpp"
 #include "json/json.hpp"
+#include "json/json_file.hpp"
 #include "options/knowledge_options.hpp"
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
 #include "options/resume_options.hpp"
+#include "options/scale_option.hpp"
 #include "records/fragments_json.hpp"
 #include "records/pair_store.hpp"
 #include "records/result_json.hpp"
 #include "records/scan_table.hpp"
 #include "run/interrupt.hpp"
 #include "run/progress.hpp"
+#include "run/scaled_run.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -37,6 +41,7 @@ struct BatchOptions {
   MethodOptions method;
   ViewpointChoice viewpoint;  // of clouds without cameras: auto or none
   std::string up;
+  ScaleChoice scale;
   std::string log, info, json;
   ResumeOptions resume;
   bool quiet = false;
@@ -212,6 +217,58 @@ class Batch {
   std::map<std::string, std::size_t> reasons_;
 };
 
+/// What the search of a scale does not go with.
+void check_scale(const BatchOptions& o) {
+  o.scale.range();
+  for (const auto& [given, name] :
+       {std::pair(!o.up.empty(), "--up"), std::pair(!o.info.empty(), "--info"),
+        std::pair(o.resume.resume, "--resume"), std::pair(o.resume.restart, "--restart")})
+    if (given) throw InvalidArgument(std::string("--scale and ") + name + " do not go together");
+}
+
+/// A batch whose scans have scales of their own: without a journal.
+int run_with_scale(const BatchOptions& o) {
+  const InterruptGuard guard;
+  const Context context = o.method.context();
+  const ScaledRun run = run_scaled(context, o.input, o.pairs, o.scale.range(), o.method,
+                                   o.viewpoint.text != "none", o.quiet);
+  std::size_t aligned = 0;
+  std::map<std::string, std::size_t> reasons;
+  for (const ScaledResult& result : run.results)
+    if (result.aligned())
+      ++aligned;
+    else
+      ++reasons[to_string(result.result.reason)];
+  if (run.interrupted) {
+    std::cerr << "gpureg: interrupted, nothing written" << std::endl;
+    return kInterrupted;
+  }
+  write_scaled_log(o.log, run);
+  if (can_have_journal(o.log) && !are_numbered(run.folder.all()))
+    write_scan_table(scan_table_of(o.log), run.folder.all());
+  if (!o.json.empty()) {
+    Json json;
+    json["gpureg"] = "batch";
+    json["environment"] = environment(context);
+    json["options"] = to_json(o.method.registration());
+    json["folder"] = o.input.path;
+    json["scale"] = o.scale.text;
+    json["seconds"] = {{"align", run.seconds}};
+    json["pairs"] = scaled_pairs_json(run);
+    write_document(o.json, json);
+  }
+  if (!o.quiet) {
+    std::cout << "pairs      " << run.pairs.size() << ", in " << fixed(run.seconds, 2) << " s ("
+              << context.description() << ")\n"
+              << "aligned    " << aligned << ", written to " << o.log
+              << " with their scales in the poses\n";
+    if (!reasons.empty())
+      std::cout << "not        " << run.pairs.size() - aligned << ": " << counted(reasons) << "\n";
+  }
+  if (!run.folder.unusable.empty()) return kIncomplete;
+  return aligned > 0 ? kOk : kNoAlignment;
+}
+
 }  // namespace
 
 void add_batch(CommandLine& line) {
@@ -227,6 +284,7 @@ void add_batch(CommandLine& line) {
               "agree with it; none: not known")
       .one_of({"auto", "none"})
       .show_default();
+  o->scale.add_to(verb);
   verb.option("--up", o->up,
               "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
               "be off (without: 10): 0,0,1,5");
@@ -244,6 +302,11 @@ void add_batch(CommandLine& line) {
     up_prior(o->up);
     check_batch_outputs(*o);
     check_pairs(o->input, o->pairs);
+    if (o->scale.given()) {
+      check_scale(*o);
+      if (!o->quiet) o->method.note_calibration();
+      return run_with_scale(*o);
+    }
     o->method.choose_voxel_size(o->input, o->resume.resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Batch(*o).run();

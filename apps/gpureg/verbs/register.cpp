@@ -102,7 +102,8 @@ std::string next_step(const RegisterOptions& o, RegistrationReason reason) {
                              reason == RegistrationReason::too_little_overlap))
     return "is the pose target_from_source, not its inverse, and in the unit of the clouds?";
   // Whatever else is wrong follows from it.
-  if (!o.other_units.empty()) return o.other_units + "; bring both to one unit";
+  if (!o.other_units.empty())
+    return o.other_units + "; bring both to one unit, or give --scale free";
   std::string next = in_option_names(advice(reason));
   if (!o.perhaps_other_units.empty()) next += "; " + o.perhaps_other_units;
   const bool nowhere = reason == RegistrationReason::too_little_overlap ||
@@ -253,18 +254,7 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
   json["source"] = {{"file", o.source}, {"prepare", to_json(source.statistics())}};
   json["target"] = {{"file", o.target}, {"prepare", to_json(target.statistics())}};
   json["result"] = to_json(result, "target_from_source");
-  if (o.scaled) {
-    Json& out = json["result"];
-    out["target_from_source"] =
-        result.has_candidate ? to_json(Eigen::MatrixXd(pose_matrix(o, result))) : Json(nullptr);
-    out["scale"] = o.scaled->scale;
-    out["scale_status"] = to_string(o.scaled->scale_status);
-    out["scale_deviation"] = o.scaled->scale_deviation;
-    out["scale_information"] = to_json(Eigen::MatrixXd(o.scaled->information));
-    out["scales"] = Json::array();
-    for (const ScaleCandidate& c : o.scaled->candidates)
-      out["scales"].push_back({{"scale", c.scale}, {"confidence", c.confidence}});
-  }
+  if (o.scaled) json["result"].update(scale_to_json(*o.scaled, "target_from_source"));
   json["result"]["explanation"] = explained(o, result);
   json["result"]["advice"] = next_step(o, result.reason);
   json["result"]["information_redwood"] = to_json(result.source_moments.information_redwood());

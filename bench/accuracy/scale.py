@@ -1,0 +1,160 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Clouds whose scales differ by an unknown factor: what the search of the scale finds, and what it costs.
+
+Every cloud is moved by a random pose, and the source is divided by a factor, at random from 0.05 to 20
+(`free`) or 1 (`one`). `known`: the same pair at its true scale. One entry for each set and seed: pairs;
+`correct`: the first pose is correct by the rule of viewpoints.py; `reported`, `reported_wrong`: at a
+confidence of 0.5; `recall_at_95`: share of the pairs with a correct pose among the most confident ones of
+which 95 % are correct; `scale_error`: median of |scale / factor - 1| of the correct pairs, and the share
+below 0.01; `times`: seconds of all pairs with an unknown scale / with the known one, preparation included.
+With --voxel auto sets take the voxel size that both clouds suggest at their true scale, as `known` does.
+
+usage: scale.py DATA [--sets kitchen,lidar] [--pairs 8] [--seeds 1 2 3] [--conditions free,one] [--backend cpu]
+       [--json OUT]
+Needs numpy and the Python package gpureg."""
+
+import argparse
+import json
+import pathlib
+import time
+
+import gpureg
+import numpy as np
+import viewpoints
+from record import commit, save
+
+FACTORS = (0.05, 20)
+SETS = ("kitchen", "house_a", "lidar", "kitti", "dragon", "cad", "fgr")
+
+
+def rigid_at(points, similarity):
+    """The rigid motion that turns like the similarity, and moves the points' centre to the same place."""
+    centre, pose = points.mean(0), similarity.copy()
+    pose[:3, :3] /= np.cbrt(np.linalg.det(similarity[:3, :3]))
+    pose[:3, 3] = similarity[:3, :3] @ centre + similarity[:3, 3] - pose[:3, :3] @ centre
+    return pose
+
+
+def recall_at(precision, outcomes):
+    """Share of all pairs that are correct among the most confident ones of that precision."""
+    best = right = 0
+    for count, (_, correct) in enumerate(sorted(outcomes, key=lambda o: -o[0]), 1):
+        right += correct
+        if right >= precision * count:
+            best = right
+    return best / max(1, len(outcomes))
+
+
+def counts(outcomes):
+    """(confidence, correct, reported) of each pair to counts."""
+    return {
+        "correct": sum(o[1] for o in outcomes),
+        "reported": sum(o[1] and o[2] for o in outcomes),
+        "reported_wrong": sum(o[2] and not o[1] for o in outcomes),
+        "recall_at_95": round(recall_at(0.95, [o[:2] for o in outcomes]), 4),
+    }
+
+
+def run(name, scenes, limit, seed, condition, context):
+    rng = np.random.default_rng(seed)
+    known, searched, errors, statuses, seconds = [], [], [], {}, [0.0, 0.0]
+    for scene in scenes:
+        for s, t, truths in scene.pairs[:limit]:
+            if not truths:
+                continue
+            clouds = [scene.clouds[k] for k in (s, t)]
+            poses = [viewpoints.random_pose(rng, cloud.reach) for cloud in clouds]
+            factor = float(np.exp(rng.uniform(*np.log(FACTORS)))) if condition == "free" else 1.0
+            source, target = (viewpoints.moved(p, c.points) for p, c in zip(poses, clouds))
+            voxel = (
+                gpureg.suggest_voxel_size([source, target]).voxel_size
+                if scene.voxel == "auto"
+                else float(scene.voxel)
+            )
+            options = gpureg.RegistrationOptions.from_voxel_size(voxel)
+            options.seed = seed
+
+            def correct(similarity):
+                found = np.linalg.inv(poses[1]) @ similarity @ poses[0]
+                points = clouds[0].points[::50]
+                return bool(scene.right(points, rigid_at(points, found), truths))
+
+            begin = time.perf_counter()
+            a = gpureg.register(source, target, options=options, context=context)
+            middle = time.perf_counter()
+            b = gpureg.register(
+                source / factor, target, scale="free", options=options, context=context
+            )
+            seconds[0] += middle - begin
+            seconds[1] += time.perf_counter() - middle
+            of_known = correct(np.asarray(a.target_from_source)) if a.has_candidate else False
+            known.append((a.score, of_known, a.aligned))
+            error = abs(b.scale / factor - 1)
+            to_source = np.diag([1 / factor, 1 / factor, 1 / factor, 1])
+            found = b.result.has_candidate and correct(b.target_from_source @ to_source)
+            found = found and error < 0.1
+            searched.append((b.confidence, found, b.aligned))
+            statuses[b.scale_status] = statuses.get(b.scale_status, 0) + 1
+            if found:
+                errors.append(error)
+            print(
+                f"{name} {condition} {seed}: {s} {t} factor {factor:.3g}, known {of_known} {a.score:.3f}, "
+                f"searched {found} {b.confidence:.3f} {b.scale_status}, error {error:.4f}, "
+                f"{middle - begin:.2f} s and {time.perf_counter() - middle:.2f} s",
+                flush=True,
+            )
+    return {
+        "seed": seed,
+        "pairs": len(known),
+        "known": counts(known),
+        "searched": counts(searched),
+        "lost": sum(k[1] and not s[1] for k, s in zip(known, searched)),
+        "won": sum(s[1] and not k[1] for k, s in zip(known, searched)),
+        "statuses": statuses,
+        "scale_error": round(float(np.median(errors)), 5) if errors else None,
+        "scale_within_1_percent": round(float(np.mean(np.array(errors) < 0.01)), 4) if errors else None,
+        "times": round(seconds[1] / max(1e-9, seconds[0]), 2),
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("data", type=pathlib.Path)
+    parser.add_argument("--sets", default=",".join(SETS))
+    parser.add_argument("--pairs", type=int, default=8, help="of a scene, at most")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--conditions", default="free")
+    parser.add_argument("--backend", choices=("cpu", "cuda"), default="cpu")
+    parser.add_argument("--json", type=pathlib.Path)
+    arguments = parser.parse_args()
+    context = getattr(gpureg.Context, arguments.backend)()
+    record = {"sets": {}}
+    if arguments.json and arguments.json.exists():
+        record = json.loads(arguments.json.read_text())
+    for name in arguments.sets.split(","):
+        scenes = getattr(viewpoints, name)(
+            arguments.data, arguments.pairs, np.random.default_rng(0)
+        )
+        entry = {
+            "command": f"bench/accuracy/scale.py --sets {name} --pairs {arguments.pairs} "
+            f"--seeds {' '.join(map(str, arguments.seeds))} --conditions {arguments.conditions}",
+            "commit": commit(),
+            "backend": arguments.backend,
+        }
+        for condition in arguments.conditions.split(","):
+            entry[condition] = []
+            for seed in arguments.seeds:
+                entry[condition].append(
+                    run(name, scenes, arguments.pairs, seed, condition, context)
+                )
+                print(name, condition, entry[condition][-1], flush=True)
+                record["sets"].setdefault(name, {}).update(entry)
+                if arguments.json:
+                    save(arguments.json, record)
+
+
+if __name__ == "__main__":
+    main()
