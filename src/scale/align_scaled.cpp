@@ -128,17 +128,14 @@ std::vector<ScaledResult> align_scaled_batch(
   const auto target_of = [&](std::uint32_t k) -> const scale::PreparedTarget& {
     const auto known = targets.find(k);
     if (known != targets.end()) return known->second;
-    return targets
-        .emplace(k, scale::PreparedTarget(
-                        naming(k, [&] { return prepare(context, clouds[k], options.prepare); }),
-                        options))
-        .first->second;
+    naming(k, [&] { targets.emplace(k, scale::PreparedTarget(context, clouds[k], options)); });
+    return targets.at(k);
   };
 
   std::vector<ScaledResult> results(pairs.size());
   bool stopped = false;
   for (const std::uint32_t source : order) {
-    std::optional<scale::PreparedLadder> ladder;
+    std::map<float, scale::PreparedLadder> ladders;  // by the voxel size of the search
     std::optional<PreparedCloud> known;
     for (const std::size_t p : of_source[source]) {
       StopScope::poll();
@@ -152,10 +149,18 @@ std::vector<ScaledResult> align_scaled_batch(
             return prepare(context, scaled.view(), options.prepare);
           });
         results[p] = of_known(align(context, *known, target.cloud, options), range.least);
+      } else if (target.cloud.size() < 4) {
+        results[p].result.status = RegistrationStatus::not_aligned;
+        results[p].result.reason = RegistrationReason::too_few_target_points;
       } else {
-        if (!ladder)
-          naming(source, [&] { ladder.emplace(context, clouds[source], range, options); });
-        results[p] = scale::search_scale(context, *ladder, target, range, options);
+        auto ladder = ladders.find(target.search.voxel_size);
+        if (ladder == ladders.end())
+          ladder = naming(source, [&] {
+                     return ladders.emplace(
+                         target.search.voxel_size,
+                         scale::PreparedLadder(context, clouds[source], range, target.search));
+                   }).first;
+        results[p] = scale::search_scale(context, ladder->second, target, range, options);
       }
       if (callbacks.on_result) callbacks.on_result(p, results[p]);
     }

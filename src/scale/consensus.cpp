@@ -36,29 +36,27 @@ struct Columns {
   }
 };
 
-/// Ratios of the distances between a match and the first `count` ones; 0 where the pair does not
-/// vote.
-void ratios_of(const Columns& c, std::uint32_t own, std::uint32_t count, float squared_shortest,
-               float* out) {
+/// Bins of the ratios of the distances between a match and the first `count` ones; kBins where the
+/// pair does not vote. Without branches: vector instructions.
+void bins_of(const Columns& c, std::uint32_t own, std::uint32_t count, float squared_shortest,
+             std::uint32_t* out) {
   const float px = c.px[own], py = c.py[own], pz = c.pz[own], qx = c.qx[own], qy = c.qy[own],
               qz = c.qz[own], mx = c.mx[own], my = c.my[own], mz = c.mz[own], nx = c.nx[own],
               ny = c.ny[own], nz = c.nz[own];
+  const float *cpx = c.px.data(), *cpy = c.py.data(), *cpz = c.pz.data(), *cqx = c.qx.data(),
+              *cqy = c.qy.data(), *cqz = c.qz.data(), *cmx = c.mx.data(), *cmy = c.my.data(),
+              *cmz = c.mz.data(), *cnx = c.nx.data(), *cny = c.ny.data(), *cnz = c.nz.data();
   for (std::uint32_t k = 0; k < count; ++k) {
-    const float ax = c.px[k] - px, ay = c.py[k] - py, az = c.pz[k] - pz;
-    const float bx = c.qx[k] - qx, by = c.qy[k] - qy, bz = c.qz[k] - qz;
+    const float ax = cpx[k] - px, ay = cpy[k] - py, az = cpz[k] - pz;
+    const float bx = cqx[k] - qx, by = cqy[k] - qy, bz = cqz[k] - qz;
     const float a = ax * ax + ay * ay + az * az, b = bx * bx + by * by + bz * bz;
     const float turn =
-        (c.mx[k] * mx + c.my[k] * my + c.mz[k] * mz) - (c.nx[k] * nx + c.ny[k] * ny + c.nz[k] * nz);
+        (cmx[k] * mx + cmy[k] * my + cmz[k] * mz) - (cnx[k] * nx + cny[k] * ny + cnz[k] * nz);
+    const float place = (std::sqrt(b / std::max(a, squared_shortest)) - kLeastRatio) * (1 / kBin);
     const bool votes = (a > squared_shortest) & (b > squared_shortest) & (turn < kLargestTurn) &
-                       (turn > -kLargestTurn);
-    out[k] = votes ? std::sqrt(b / a) : 0.0f;
+                       (turn > -kLargestTurn) & (place >= 0) & (place < static_cast<float>(kBins));
+    out[k] = votes ? static_cast<std::uint32_t>(static_cast<std::int32_t>(place)) : kBins;
   }
-}
-
-std::uint32_t bin_of(float ratio) {
-  if (!(ratio >= kLeastRatio)) return kBins;
-  const float place = (ratio - kLeastRatio) * (1 / kBin);
-  return place < static_cast<float>(kBins) ? static_cast<std::uint32_t>(place) : kBins;
 }
 
 struct Seed {
@@ -68,12 +66,12 @@ struct Seed {
 /// The matches with the most votes for two neighbouring bins of ratios.
 std::vector<Seed> seeds_of(const Columns& c, std::uint32_t count, float squared_shortest) {
   const std::uint32_t voters = std::min(count, kVoters);
-  std::vector<float> ratio(voters);
+  std::vector<std::uint32_t> bin(voters);
   std::vector<Seed> seeds;
   for (std::uint32_t own = 0; own < count; ++own) {
-    ratios_of(c, own, voters, squared_shortest, ratio.data());
+    bins_of(c, own, voters, squared_shortest, bin.data());
     std::array<std::uint32_t, kBins + 1> votes{};
-    for (std::uint32_t k = 0; k < voters; ++k) ++votes[bin_of(ratio[k])];
+    for (std::uint32_t k = 0; k < voters; ++k) ++votes[bin[k]];
     Seed seed{own, 0, 0};
     for (std::uint32_t b = 0; b + 1 < kBins; ++b)
       if (const std::uint32_t sum = votes[b] + votes[b + 1]; sum > seed.votes) seed = {own, sum, b};
@@ -150,15 +148,14 @@ std::vector<Proposal> propose_factors(const Matches& matches, float voxel, std::
   const float squared_shortest = kShortest * kShortest * voxel * voxel;
   const Columns columns(matches, count);
   Fitter fitter(matches, count, voxel);
-  std::vector<float> ratio(count);
+  std::vector<std::uint32_t> bin(count);
   std::vector<Proposal> out;
   for (const Seed& s : seeds_of(columns, count, squared_shortest)) {
     if (s.votes < kLeastInliers) break;
-    ratios_of(columns, s.match, count, squared_shortest, ratio.data());
+    bins_of(columns, s.match, count, squared_shortest, bin.data());
     std::vector<std::uint32_t> members;
     for (std::uint32_t k = 0; k < count; ++k)
-      if (const std::uint32_t bin = bin_of(ratio[k]); bin == s.bin || bin == s.bin + 1)
-        members.push_back(k);
+      if (bin[k] == s.bin || bin[k] == s.bin + 1) members.push_back(k);
     const auto size = static_cast<std::uint32_t>(members.size());
     Similarity best{};
     std::uint32_t most = 0;
@@ -170,8 +167,9 @@ std::vector<Proposal> propose_factors(const Matches& matches, float voxel, std::
       const float of_source = squared_norm(matches.p[a] - matches.p[b]),
                   of_target = squared_norm(matches.q[a] - matches.q[b]);
       if (!(of_source > squared_shortest)) continue;
-      const float side = std::sqrt(of_target / of_source);
-      if (!(std::abs(side - ratio[a]) < 3 * kBin)) continue;
+      const float side = std::sqrt(of_target / of_source),
+                  voted = kLeastRatio + kBin * static_cast<float>(s.bin + 1);
+      if (!(std::abs(side - voted) < 3 * kBin)) continue;
       Similarity motion;
       if (!fitter.fit({s.match, a, b}, motion)) continue;
       std::uint32_t agreeing = 0;

@@ -10,7 +10,7 @@ namespace gpureg::scale {
 /// Ratio of neighbouring rungs. Features find their matches within a fifth of the true scale.
 constexpr double kStep = 1.2;
 /// Prepared points of a cloud at a rung: fewer say nothing, more take longer than all other rungs.
-constexpr std::size_t kLeastPoints = 150, kMostPoints = 40'000;
+constexpr std::size_t kLeastPoints = 150, kMostPoints = 30'000;
 
 /// Scales of the source that are worth a comparison, ascending: powers of kStep at which it has
 /// between kLeastPoints and kMostPoints voxels, or nearly all of its points stand alone beyond

@@ -74,7 +74,7 @@ std::vector<double> propose_scales(const Context& context, const PreparedLadder&
     std::vector<Proposal> proposals;
   };
   Engine& engine = *Access::engine(context);
-  const PreparedState& fixed = *Access::state(target.cloud);
+  const PreparedState& fixed = *Access::state(target.coarse);
   std::vector<Task> tasks;
   std::vector<PairInput> inputs;
   for (std::size_t r = 0; r < source.rungs().size(); ++r) {
@@ -95,7 +95,7 @@ std::vector<double> propose_scales(const Context& context, const PreparedLadder&
     std::vector<FeatureMatches> found = engine.match({inputs.data() + begin, end - begin}, options);
     for (std::size_t k = begin; k < end; ++k) tasks[k].matches = std::move(found[k - begin]);
   });
-  const float voxel = options.prepare.voxel_size;
+  const float voxel = target.search.voxel_size;
   for_each_on(engine.host_threads(), tasks.size(), [&](std::size_t k) {
     Task& task = tasks[k];
     task.proposals =

@@ -13,7 +13,9 @@ constexpr double kWide = 4, kNarrow = 0.8;
 /// Largest distance of a correspondence, in widths of the kernel.
 constexpr double kReach = 3;
 constexpr std::size_t kLeastMatches = 40;
-constexpr double kSettled = 1e-5;  ///< change of the logarithm of the scale
+/// While the kernel is wide, so many points are one.
+constexpr int kStride = 4;
+constexpr double kSettled = 1e-4;  ///< change of the logarithm of the scale
 /// Cosine of the largest angle between the normals of a correspondence.
 constexpr double kLeastCosine = 0.8;
 
@@ -163,6 +165,7 @@ RefinedScale refine_scale(const ClosestSurface& source, const ClosestSurface& ta
   const double narrow = static_cast<double>(kernel);
   double width = kWide * narrow;
   for (int iteration = 0; iteration <= kIterations; ++iteration) {
+    const int stride = width > narrow ? kStride : 1;
     const double reach = std::min(kReach * width, static_cast<double>(target.distance()));
     std::vector<Match> matches;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -173,14 +176,14 @@ RefinedScale refine_scale(const ClosestSurface& source, const ClosestSurface& ta
       matches.push_back({moved, by_target ? of_target : of_source, fixed});
       sum += moved;
     };
-    for (int k = 0; k < static_cast<int>(source.size()); ++k) {
+    for (int k = 0; k < static_cast<int>(source.size()); k += stride) {
       const Eigen::Vector3d moved = factor * (rotation * wide(source.point(k))) + shift;
       const int found = target.closest(narrowed(moved), static_cast<float>(reach));
       if (found >= 0)
         add(moved, wide(target.point(found)), rotation * wide(source.normal(k)),
             wide(target.normal(found)), true);
     }
-    for (int k = 0; k < static_cast<int>(target.size()); ++k) {
+    for (int k = 0; k < static_cast<int>(target.size()); k += stride) {
       const Eigen::Vector3d fixed = wide(target.point(k));
       const int found = source.closest(narrowed(rotation.transpose() * (fixed - shift) / factor),
                                        static_cast<float>(reach / factor));
@@ -188,7 +191,7 @@ RefinedScale refine_scale(const ClosestSurface& source, const ClosestSurface& ta
         add(factor * (rotation * wide(source.point(found))) + shift, fixed,
             rotation * wide(source.normal(found)), wide(target.normal(k)), false);
     }
-    if (matches.size() < kLeastMatches) return {};
+    if (matches.size() * static_cast<std::size_t>(stride) < kLeastMatches) return {};
     const Eigen::Vector3d centre = sum / static_cast<double>(matches.size());
     Equations e;
     for (const Match& m : matches)

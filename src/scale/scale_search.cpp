@@ -7,6 +7,7 @@
 
 #include "api/access.hpp"
 #include "api/frames.hpp"
+#include "common/for_each_on.hpp"
 
 namespace gpureg::scale {
 namespace {
@@ -64,11 +65,11 @@ std::vector<Trial> tried(const Context& context, const PreparedLadder& source,
   prepared.push_back(target.cloud);
   std::vector<RegistrationResult> results = align_batch(context, prepared, pairs, options);
   std::vector<Trial> out(scales.size());
-  for (std::size_t k = 0; k < out.size(); ++k) {
+  for_each_on(Access::engine(context)->host_threads(), out.size(), [&](std::size_t k) {
     Trial& trial = out[k];
     trial.scale = scales[k];
     trial.result = std::move(results[k]);
-    if (!trial.result.has_candidate) continue;
+    if (!trial.result.has_candidate) return;
     const PreparedState &s = *Access::state(prepared[k]), &t = *Access::state(target.cloud);
     const Pose<double> local = to_local(trial.result.target_from_source, s, t, false);
     UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
@@ -78,7 +79,7 @@ std::vector<Trial> tried(const Context& context, const PreparedLadder& source,
     const ClosestSurface surface(std::move(points.points), std::move(points.normals),
                                  kReachOfSource * options.prepare.max_correspondence_distance);
     trial.refined = refine_scale(surface, target.surface, pose, options.refine.kernel_width);
-  }
+  });
   return out;
 }
 
@@ -154,9 +155,9 @@ void refuse(ScaledResult& out, RegistrationReason reason) {
 }  // namespace
 
 PreparedLadder::PreparedLadder(const Context& context, const PointCloudView& source,
-                               const ScaleRange& range, const RegistrationOptions& options)
+                               const ScaleRange& range, const PrepareOptions& options)
     : source_(source) {
-  PrepareOptions prepare = options.prepare;
+  PrepareOptions prepare = options;
   prepare.surface_side_distance = 0;  // matches do not need it
   std::vector<std::unique_ptr<ScaledCloud>> clouds;
   std::vector<PointCloudView> views;
@@ -182,11 +183,35 @@ PreparedLadder::PreparedLadder(const Context& context, const PointCloudView& sou
           {scales[k], prepared[k], Access::state(prepared[k])->copy_points_and_normals()});
 }
 
-PreparedTarget::PreparedTarget(const PreparedCloud& prepared, const RegistrationOptions& options)
-    : cloud(prepared),
-      points(Access::state(prepared)->copy_points_and_normals()),
-      surface(points.points, points.normals, kReach * options.prepare.max_correspondence_distance) {
+PrepareOptions search_options(const PreparedCloud& target, const RegistrationOptions& options) {
+  PrepareOptions out = options.prepare;
+  constexpr float kLonger = 1.5f;
+  for (std::size_t points = target.size(); points > kMostTargetPoints;
+       points = static_cast<std::size_t>(static_cast<double>(points) / (kLonger * kLonger)))
+    for (float* length :
+         {&out.voxel_size, &out.normal_radius, &out.feature_radius, &out.wide_feature_radius,
+          &out.max_correspondence_distance, &out.surface_side_distance})
+      *length *= kLonger;
+  return out;
 }
+
+namespace {
+
+ClosestSurface surface_of(const PreparedCloud& cloud, float distance) {
+  PointsAndNormals points = Access::state(cloud)->copy_points_and_normals();
+  return {std::move(points.points), std::move(points.normals), distance};
+}
+
+}  // namespace
+
+PreparedTarget::PreparedTarget(const Context& context, const PointCloudView& target,
+                               const RegistrationOptions& options)
+    : cloud(prepare(context, target, options.prepare)),
+      search(search_options(cloud, options)),
+      coarse(search.voxel_size == options.prepare.voxel_size ? cloud
+                                                             : prepare(context, target, search)),
+      points(Access::state(coarse)->copy_points_and_normals()),
+      surface(surface_of(cloud, kReach * options.prepare.max_correspondence_distance)) {}
 
 ScaledResult search_scale(const Context& context, const PreparedLadder& source,
                           const PreparedTarget& target, const ScaleRange& range,
@@ -195,9 +220,8 @@ ScaledResult search_scale(const Context& context, const PreparedLadder& source,
   const std::vector<double> scales = propose_scales(context, source, target, range, options);
   if (scales.empty()) {
     out.result.status = RegistrationStatus::not_aligned;
-    out.result.reason = source.rungs().empty()    ? RegistrationReason::too_few_source_points
-                        : target.cloud.size() < 4 ? RegistrationReason::too_few_target_points
-                                                  : RegistrationReason::no_candidate;
+    out.result.reason = source.rungs().empty() ? RegistrationReason::too_few_source_points
+                                               : RegistrationReason::no_candidate;
     return out;
   }
   std::vector<Trial> trials = tried(context, source, target, scales, options);

@@ -11,11 +11,17 @@
 
 namespace gpureg::scale {
 
+/// Options of the preparation for the search of scales: with more than kMostTargetPoints points of
+/// the target, all lengths are longer by a power of 1.5.
+constexpr std::size_t kMostTargetPoints = 12'000;
+PrepareOptions search_options(const PreparedCloud& target, const RegistrationOptions& options);
+
 /// A source at the rungs of the ladder.
 class PreparedLadder {
  public:
+  /// options: search_options() of the targets.
   PreparedLadder(const Context& context, const PointCloudView& source, const ScaleRange& range,
-                 const RegistrationOptions& options);
+                 const PrepareOptions& options);
 
   struct Rung {
     double scale;
@@ -33,13 +39,17 @@ class PreparedLadder {
 /// A target for any number of ladders.
 struct PreparedTarget {
   PreparedCloud cloud;
-  PointsAndNormals points;
-  ClosestSurface surface;
+  PrepareOptions search;    ///< see search_options()
+  PreparedCloud coarse;     ///< prepared with them
+  PointsAndNormals points;  ///< of coarse
+  ClosestSurface surface;   ///< of cloud
 
-  PreparedTarget(const PreparedCloud& prepared, const RegistrationOptions& options);
+  PreparedTarget(const Context& context, const PointCloudView& target,
+                 const RegistrationOptions& options);
 };
 
-/// Scales that the matches of the rungs agree on, the best-supported first.
+/// Scales that the matches of the rungs agree on, the best-supported first. The ladder is one of
+/// the search options of the target.
 std::vector<double> propose_scales(const Context& context, const PreparedLadder& source,
                                    const PreparedTarget& target, const ScaleRange& range,
                                    const RegistrationOptions& options);

@@ -19,13 +19,20 @@ std::vector<Eigen::Vector3f> times(double factor, std::vector<Eigen::Vector3f> p
   return points;
 }
 
+/// One of four points: a short ladder.
+std::vector<Eigen::Vector3f> thinned(const std::vector<Eigen::Vector3f>& points) {
+  std::vector<Eigen::Vector3f> out;
+  for (std::size_t k = 0; k < points.size(); k += 4) out.push_back(points[k]);
+  return out;
+}
+
 class UnknownScale : public testing::Test {
  protected:
   UnknownScale() : options(RegistrationOptions::from_voxel_size(0.1f)) {
     std::mt19937 random(11);
-    target = test::scan_room(random);
+    target = thinned(test::scan_room(random));
     truth = test::random_pose(random);
-    source = test::moved(truth.inverse(), test::scan_room(random));
+    source = test::moved(truth.inverse(), thinned(test::scan_room(random)));
   }
   /// The target is seen through `similarity` of a source that was divided by the factor.
   void expect_truth(const ScaledResult& result, double factor) const {
@@ -36,7 +43,7 @@ class UnknownScale : public testing::Test {
     const Eigen::Matrix4d found = result.similarity();
     EXPECT_NEAR(std::cbrt(found.topLeftCorner<3, 3>().determinant()), result.scale,
                 1e-9 * result.scale);
-    for (std::size_t k = 0; k < source.size(); k += 997) {
+    for (std::size_t k = 0; k < source.size(); k += 97) {
       const Eigen::Vector3d p = source[k].cast<double>();
       const Eigen::Vector3d q = (found * (p / factor).homogeneous()).head<3>();
       EXPECT_LT((q - truth * p).norm(), 0.06);
@@ -50,18 +57,15 @@ class UnknownScale : public testing::Test {
 };
 
 TEST_F(UnknownScale, IsFound) {
-  for (const double factor : {0.05, 20.0}) {
-    const auto scaled = times(1 / factor, source);
-    expect_truth(align_scaled(context, PointCloudView(scaled), PointCloudView(target), {}, options),
-                 factor);
-  }
+  const auto scaled = times(1 / 0.05, source);
+  expect_truth(align_scaled(context, PointCloudView(scaled), PointCloudView(target), {}, options),
+               0.05);
 }
 
 TEST_F(UnknownScale, IsFoundInARange) {
-  const auto scaled = times(1 / 3.1, source);
+  const auto scaled = times(1 / 20.0, source);
   expect_truth(
-      align_scaled(context, PointCloudView(scaled), PointCloudView(target), {2.5, 4.0}, options),
-      3.1);
+      align_scaled(context, PointCloudView(scaled), PointCloudView(target), {16, 25}, options), 20);
   const ScaledResult outside =
       align_scaled(context, PointCloudView(scaled), PointCloudView(target), {0.2, 0.4}, options);
   EXPECT_FALSE(outside.aligned());
