@@ -20,8 +20,9 @@ namespace gpureg::reconstruction {
 struct AuditedReconstruction {
   Reconstruction map;
   Audit audit;
-  /// More confident pairs contradicted the map than their confidences explain. Then only pairs are
-  /// trusted that keep scans of consecutive numbers beside each other.
+  /// Pairs contradicted the map more than their confidences explain, or consecutive scans lay far
+  /// apart in it. Then only pairs are trusted that keep scans of consecutive numbers beside each
+  /// other; without such an order every pair counts by itself, and for less.
   bool places_look_alike = false;
 };
 
