@@ -180,48 +180,6 @@ def test_progress_counts_up(source):
     assert seen[0] == (0, 20) and seen[-1] == (20, 20) and seen == sorted(seen) and len(seen) > 3
 
 
-def test_results_arrive_while_others_are_under_way(source):
-    context = gpureg.Context.cpu(1)
-    cloud = gpureg.prepare(source, context=context)
-    events = []
-    pairs = np.array([(0, 1), (1, 0)] * 10, np.uint32)
-    results, error = gpureg._core.align_batch(
-        context,
-        [cloud, cloud],
-        pairs,
-        few(500),
-        lambda done: events.append(("progress", done)),
-        on_result=lambda k, result: events.append((k, bits(result))),
-    )
-    assert error is None
-    assert [e for e in events if e[0] != "progress"] == [
-        (k, bits(result)) for k, result in enumerate(results)
-    ]
-    arrived = 0
-    for name, value in events:
-        if name == "progress":
-            assert value == arrived
-        else:
-            arrived += 1
-    whole = gpureg.align_batch([cloud, cloud], pairs, options=few(500), context=context)
-    assert [bits(result) for result in results] == [bits(result) for result in whole]
-
-
-def test_an_error_keeps_what_has_arrived(source):
-    context = gpureg.Context.cpu(1)
-    cloud = gpureg.prepare(source, context=context)
-
-    def fail(k, result):
-        if k == 3:
-            raise RuntimeError("enough")
-
-    results, error = gpureg._core.align_batch(
-        context, [cloud], np.zeros((500, 2), np.uint32), few(500), on_result=fail
-    )
-    done = sum(result.status != "skipped" for result in results)
-    assert str(error) == "enough" and 3 < done < 500
-
-
 @pytest.mark.parametrize("watched", [False, True])
 def test_a_batch_is_checked_before_its_first_pair(source, watched):
     cloud = gpureg.prepare(source)

@@ -76,12 +76,6 @@ PointCloud FragmentFolder::read(std::size_t k, double spacing, MeshNote note) co
   return cloud;
 }
 
-bool FragmentFolder::is_unusable(int number) const {
-  return std::any_of(unusable.begin(), unusable.end(), [&](const UnusableFragment& fragment) {
-    return fragment.scan.number == number;
-  });
-}
-
 void FragmentFolder::leave_out(const std::map<std::size_t, std::string>& reasons) {
   if (reasons.empty()) return;
   if (numbers.size() - reasons.size() < 2) throw IoError(reasons.begin()->second);

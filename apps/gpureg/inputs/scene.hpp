@@ -42,7 +42,6 @@ class FragmentFolder {
   /// numbers are missing.
   int count() const { return count_; }
   bool has(int number) const;
-  bool is_unusable(int number) const;
   std::uint32_t index_of(int number) const;  ///< of a fragment that is there
 
   /// Cloud k with its sensor positions: those of cameras.txt, else those of its file. See

@@ -6,6 +6,7 @@
 
 #include "bindings.hpp"
 #include "gpureg/sets/register_all.hpp"
+#include "teller.hpp"
 
 namespace gpureg::python {
 
@@ -35,50 +36,6 @@ struct Journal {
     if (!journal) throw py::value_error("the journal is closed");
     return *journal;
   }
-};
-
-/// Calls Python between pieces of work that runs without its lock. What Python raises, by Ctrl-C
-/// too, ends the work, and comes out of it.
-class Teller {
- public:
-  explicit Teller(py::object tell) : tell_(std::move(tell)) {}
-
-  /// False: something was raised.
-  template <typename... T>
-  bool operator()(const T&... values) {
-    const py::gil_scoped_acquire acquire;
-    if (raised_) return false;
-    try {
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      if (!tell_.is_none()) tell_(values...);
-    } catch (...) {
-      raised_ = std::current_exception();
-    }
-    return raised_ == nullptr;
-  }
-
-  /// Asked often, it looks for signals ten times a second.
-  bool check();
-
-  /// Runs work without the lock, and throws what was raised meanwhile, if anything.
-  template <typename Work>
-  void run(const Work& work) {
-    std::exception_ptr failed;
-    {
-      const py::gil_scoped_release release;
-      try {
-        work();
-      } catch (...) {
-        failed = std::current_exception();
-      }
-    }
-    if (raised_) std::rethrow_exception(raised_);
-    if (failed) std::rethrow_exception(failed);
-  }
-
- private:
-  py::object tell_;
-  std::exception_ptr raised_;
 };
 
 /// (M, 2) uint32 rows (source, target).

@@ -157,13 +157,6 @@ LoadedCloud PythonSet::read(std::size_t k, const PrepareOptions& options) const 
   }
 }
 
-bool Teller::check() {
-  const py::gil_scoped_acquire acquire;
-  if (!raised_ && PyErr_CheckSignals() != 0)
-    raised_ = std::make_exception_ptr(py::error_already_set());
-  return raised_ == nullptr;
-}
-
 std::vector<Pair> pairs_of(const IndexArray& rows) {
   if (rows.ndim() != 2 || rows.shape(1) != 2)
     throw py::type_error("pairs: not a matrix with two columns");
