@@ -82,6 +82,15 @@ void RecordReader::damaged(const std::string& why) const {
                        (number_ > 0 ? " in record " + std::to_string(number_) : "") + ": " + why);
 }
 
+bool RecordReader::is_zero_from(std::uint64_t at) const {
+  constexpr std::uint64_t kPiece = 1 << 20;
+  for (; at < size_; at += kPiece) {
+    const std::string piece = read_part(fd_, path_, at, std::min(kPiece, size_ - at));
+    if (piece.find_first_not_of('\0') != std::string::npos) return false;
+  }
+  return true;
+}
+
 bool RecordReader::next() {
   if (at_ == 0 || size_ - at_ < kHeader + kChecksum) return false;
   ++number_;
@@ -92,8 +101,10 @@ bool RecordReader::next() {
   reader.values(&kind_, 1);
   reader.values(&size, 1);
   reader.values(&sum, 1);
-  if (checksum(std::string_view(header).substr(0, kHeader)) != sum)
+  if (checksum(std::string_view(header).substr(0, kHeader)) != sum) {
+    if (is_zero_from(at_)) return false;  // a power cut leaves zeros of what was not written
     damaged("its checksum does not match");
+  }
   if (size_ - at_ - header.size() < std::uint64_t{size} + kChecksum) return false;
   payload_ = read_part(fd_, path_, at_ + header.size(), size + kChecksum);
   files::PayloadReader(std::string_view(payload_).substr(size), path_).values(&sum, 1);

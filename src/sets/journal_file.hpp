@@ -43,6 +43,8 @@ class RecordReader {
   [[noreturn]] void damaged(const std::string& why) const;
 
  private:
+  bool is_zero_from(std::uint64_t at) const;
+
   int fd_;
   const std::string& path_;
   std::uint64_t at_ = 0, size_ = 0;

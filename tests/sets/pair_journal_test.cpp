@@ -106,6 +106,12 @@ TEST_F(Journal, CutAnywhereLosesWhatIsTornAlone) {
   EXPECT_EQ(most, 1u);
 }
 
+TEST_F(Journal, ZerosAtTheEndAreTorn) {
+  write_two();
+  write(content() + std::string(5000, '\0'));
+  EXPECT_EQ(PairJournal(path_, run(), pairs_, Mode::resume).done(), 2u);
+}
+
 TEST_F(Journal, AChangedBitIsNotResumed) {
   write_two();
   const std::string whole = content();
