@@ -114,7 +114,10 @@ bool Preparer::prepare_chunk(Chunk& chunk, std::vector<PreparedFragment>& out,
     for (std::size_t k = begin; k < end; ++k)
       out[chunk.places[k]] = {std::move(clouds[k - begin]), "", chunk.fixed_points[k]};
   };
-  std::size_t piece = context_.backend() == Backend::cpu ? 1 : chunk.clouds.size();
+  // Fewer clouds than threads would leave threads without work.
+  const std::size_t least =
+      context_.backend() == Backend::cpu ? context_.threads() : chunk.clouds.size();
+  std::size_t piece = least;
   for (std::size_t begin = 0; begin < chunk.clouds.size();) {
     const std::size_t end = std::min(chunk.clouds.size(), begin + piece);
     const auto start = std::chrono::steady_clock::now();
@@ -130,10 +133,10 @@ bool Preparer::prepare_chunk(Chunk& chunk, std::vector<PreparedFragment>& out,
     if (go_on && !go_on(chunk.places[end - 1] + 1)) return false;
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    piece = std::max<std::size_t>(
-        1, static_cast<std::size_t>(std::min(
-               static_cast<double>(kChunkClouds),
-               kPieceSeconds * static_cast<double>(end - begin) / std::max(seconds, 1e-6))));
+    const double fitting =
+        kPieceSeconds * static_cast<double>(end - begin) / std::max(seconds, 1e-6);
+    piece = std::max(
+        least, static_cast<std::size_t>(std::min(fitting, static_cast<double>(kChunkClouds))));
     begin = end;
   }
   return true;
@@ -179,6 +182,7 @@ std::vector<PreparedFragment> Preparer::prepare(const std::vector<std::size_t>& 
       return out;
     }
   }
+  if (go_on) go_on(done);  // the last ones may have had no cloud
   return out;
 }
 
