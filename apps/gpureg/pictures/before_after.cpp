@@ -21,23 +21,24 @@ int legend(Image& image, int x, Color color, const std::string& text) {
 }  // namespace
 
 PosedTitle pose_of(const RegistrationResult& result) {
-  if (!result.has_candidate) return {std::nullopt, "after: no pose found"};
+  if (!result.has_candidate) return {std::nullopt, "after: no pose found", nullptr};
   const std::string score = "(score " + fixed(result.score, 2) + ")";
   return {result.target_from_source,
-          result.aligned() ? "after: aligned " + score : "after: rejected " + score};
+          result.aligned() ? "after: aligned " + score : "after: rejected " + score, nullptr};
 }
 
 Image before_after(const PointCloud& source, const PointCloud& target, const PosedTitle& after,
                    int panel_width, int panel_height) {
   const Eigen::Matrix3d view = choose_view(target);
-  const auto panel = [&](const Eigen::Isometry3d& pose) {
-    return render({{&source, pose, kYellow}, {&target, Eigen::Isometry3d::Identity(), kBlue}}, view,
+  const auto panel = [&](const PointCloud& moved, const Eigen::Isometry3d& pose) {
+    return render({{&moved, pose, kYellow}, {&target, Eigen::Isometry3d::Identity(), kBlue}}, view,
                   panel_width, panel_height);
   };
   Image image(2 * panel_width + 1, panel_height + kBar, kPaper);
-  paste(image, panel(Eigen::Isometry3d::Identity()), 0, kBar);
+  paste(image, panel(after.unscaled ? *after.unscaled : source, Eigen::Isometry3d::Identity()), 0,
+        kBar);
   if (after.target_from_source)
-    paste(image, panel(*after.target_from_source), panel_width + 1, kBar);
+    paste(image, panel(source, *after.target_from_source), panel_width + 1, kBar);
   fill(image, panel_width, 0, 1, image.height, kLine);
   fill(image, 0, kBar - 1, image.width, 1, kLine);
 

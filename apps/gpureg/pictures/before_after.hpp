@@ -15,6 +15,7 @@ namespace gpureg::cli {
 struct PosedTitle {
   std::optional<Eigen::Isometry3d> target_from_source;
   std::string title;
+  const PointCloud* unscaled = nullptr;  ///< the source as it was given, where it was scaled
 };
 
 PosedTitle pose_of(const RegistrationResult& result);

@@ -361,6 +361,8 @@ int run(RegisterOptions o) {
   o.source_viewpoint.apply(source_cloud);
   o.target_viewpoint.apply(target_cloud);
   const ScaleRange scale = o.scale.range();
+  PointCloud unscaled;
+  if (o.scale.given() && !o.image.empty()) unscaled = source_cloud;
   if (scale.is_known()) {
     if (o.scale.given()) scale_cloud(source_cloud, scale.least);
     o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
@@ -456,7 +458,12 @@ int run(RegisterOptions o) {
       std::cerr << "gpureg: no overlay written, as there is no pose to show" << std::endl;
   }
   if (!o.image.empty()) {
-    const Image picture = before_after(source_cloud, target_cloud, pose_of(result));
+    PosedTitle after = pose_of(result);
+    if (o.scale.given()) {
+      after.unscaled = &unscaled;
+      after.title += ", scale " + significant(o.scaled->scale, 4);
+    }
+    const Image picture = before_after(source_cloud, target_cloud, after);
     files::write_atomically(o.image, encode_png(picture));
   }
   return result.aligned() ? kOk : kNoAlignment;
