@@ -9,7 +9,7 @@
 #include "gpureg/preparation/sensor_fixed.hpp"
 #include "gpureg/pruning.hpp"
 #include "gpureg/registration.hpp"
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 #include "gpureg/surface_set.hpp"
 #include "gpureg/time_budget.hpp"
 #include "gpureg/verification.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 
 #include <pybind11/stl.h>
 

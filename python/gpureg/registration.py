@@ -236,9 +236,9 @@ def _scale_range(scale: Any) -> tuple[float, float]:
         if scale != "free":
             raise ValueError(f"scale: expected 'free', a number or (least, most), got {scale!r}")
         return 0.0, 0.0
-    if isinstance(scale, (int, float, np.integer, np.floating)) and not isinstance(scale, bool):
+    if isinstance(scale, int | float | np.integer | np.floating) and not isinstance(scale, bool):
         ends = [float(scale), float(scale)]
-    elif isinstance(scale, (tuple, list)) and len(scale) == 2:
+    elif isinstance(scale, tuple | list) and len(scale) == 2:
         ends = [float(end) for end in scale]
     else:
         raise TypeError(f"scale: expected 'free', a number or (least, most), got {scale!r}")

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Registration with an unknown scale."""
 
+import gpureg
 import numpy as np
 import pytest
-
-import gpureg
 
 
 def _room(seed):

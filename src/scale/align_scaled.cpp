@@ -9,7 +9,7 @@
 #include "api/name_cloud.hpp"
 #include "common/stop_scope.hpp"
 #include "common/validate.hpp"
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 #include "scale/scale_search.hpp"
 
 namespace gpureg {

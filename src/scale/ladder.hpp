@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 
 namespace gpureg::scale {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <unordered_map>
 #include <vector>
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 #include "pipeline/prepared_state.hpp"
 #include "scale/ladder.hpp"
 #include "scale/refine.hpp"

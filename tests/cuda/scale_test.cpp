@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A searched scale on both backends: the same bits.
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "gpureg/error.hpp"
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 #include "support/expect_error.hpp"
 #include "support/result_bytes.hpp"
 #include "support/scan.hpp"

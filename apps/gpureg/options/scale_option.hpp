@@ -5,7 +5,7 @@
 
 #include "command_line.hpp"
 #include "gpureg/point_cloud.hpp"
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 
 namespace gpureg::cli {
 

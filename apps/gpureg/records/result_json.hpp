@@ -6,7 +6,7 @@
 
 #include "gpureg/context.hpp"
 #include "gpureg/result.hpp"
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 #include "json/fields_json.hpp"
 
 namespace gpureg::cli {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gpureg/context.hpp"
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 #include "inputs/scene.hpp"
 #include "json/json_fwd.hpp"
 #include "options/method_options.hpp"

@@ -15,7 +15,7 @@
 #include "gpureg/mesh.hpp"
 #include "gpureg/overlay.hpp"
 #include "gpureg/registration.hpp"
-#include "gpureg/scale.hpp"
+#include "gpureg/registration/scale.hpp"
 #include "gpureg/time_budget.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "inputs/cloud_file.hpp"

@@ -10,17 +10,20 @@ which 95 % are correct; `scale_error`: median of |scale / factor - 1| of the cor
 below 0.01; `times`: seconds of all pairs with an unknown scale / with the known one, preparation included.
 With --voxel auto sets take the voxel size that both clouds suggest at their true scale, as `known` does.
 
-usage: scale.py DATA [--sets kitchen,lidar] [--pairs 8] [--seeds 1 2 3] [--conditions free,one] [--backend cpu]
+usage: run.py DATA [--sets kitchen,lidar] [--pairs 8] [--seeds 1 2 3] [--conditions free,one] [--backend cpu]
        [--json OUT]
 Needs numpy and the Python package gpureg."""
 
 import argparse
 import json
 import pathlib
+import sys
 import time
 
 import gpureg
 import numpy as np
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
 import viewpoints
 from record import commit, save
 
@@ -75,7 +78,7 @@ def run(name, scenes, limit, seed, condition, context):
             options = gpureg.RegistrationOptions.from_voxel_size(voxel)
             options.seed = seed
 
-            def correct(similarity):
+            def correct(similarity, scene=scene, clouds=clouds, poses=poses, truths=truths):
                 found = np.linalg.inv(poses[1]) @ similarity @ poses[0]
                 points = clouds[0].points[::50]
                 return bool(scene.right(points, rigid_at(points, found), truths))
@@ -113,7 +116,9 @@ def run(name, scenes, limit, seed, condition, context):
         "won": sum(s[1] and not k[1] for k, s in zip(known, searched)),
         "statuses": statuses,
         "scale_error": round(float(np.median(errors)), 5) if errors else None,
-        "scale_within_1_percent": round(float(np.mean(np.array(errors) < 0.01)), 4) if errors else None,
+        "scale_within_1_percent": round(float(np.mean(np.array(errors) < 0.01)), 4)
+        if errors
+        else None,
         "times": round(seconds[1] / max(1e-9, seconds[0]), 2),
     }
 
@@ -139,7 +144,7 @@ def main():
             arguments.data, arguments.pairs, np.random.default_rng(0)
         )
         entry = {
-            "command": f"bench/accuracy/scale.py --sets {name} --pairs {arguments.pairs} "
+            "command": f"bench/scale/run.py --sets {name} --pairs {arguments.pairs} "
             f"--seeds {' '.join(map(str, arguments.seeds))} --conditions {arguments.conditions}",
             "commit": commit(),
             "backend": arguments.backend,
