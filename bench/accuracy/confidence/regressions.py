@@ -88,7 +88,7 @@ SIGNS = {
 }
 KNOTS = 5  # of a feature: quantiles from END to 1 - END
 END = 0.005
-STEP_PENALTY = 3.0  # half of it times the square of each rise; pairs count one on average
+STEP_PENALTY = 30.0  # half of it times the square of each rise; pairs count one on average
 RANK_PENALTY = 3.0  # the same of the weights of standardised features in the ranking
 MIN_RISE = 5e-4  # of a step that the header keeps
 LINEAR_RANK = ("log_odds", "margin", "distinct_share")  # the rank in regressions linear in it
