@@ -13,6 +13,7 @@ void add_consistency(CommandLine& line);
 void add_reconstruct(CommandLine& line);
 void add_locate(CommandLine& line);
 void add_change(CommandLine& line);
+void add_find(CommandLine& line);
 void add_evaluate(CommandLine& line);
 void add_evaluate_trajectory(CommandLine& line);
 void add_evaluate_surface(CommandLine& line);

@@ -14,6 +14,7 @@ void add_verbs(CommandLine& line) {
   add_consistency(line);
   add_reconstruct(line);
   add_locate(line);
+  add_find(line);
   add_change(line);
   add_audit(line);
   add_calibrate(line);

@@ -30,6 +30,7 @@ void bind_pose_graph(py::module_& m);
 void bind_loop_closure(py::module_& m);
 void bind_reconstruction(py::module_& m);
 void bind_sets(py::module_& m);
+void bind_find(py::module_& m);
 void bind_localization(py::module_& m);
 void bind_pruning(py::module_& m);
 void bind_trajectory(py::module_& m);

@@ -27,6 +27,7 @@ PYBIND11_MODULE(_core, m) {
   bind_sets(m);
   bind_reconstruction(m);
   bind_localization(m);
+  bind_find(m);
   bind_pruning(m);
   bind_trajectory(m);
   bind_calibration(m);

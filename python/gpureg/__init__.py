@@ -37,6 +37,9 @@ from ._core import (
     Error,
     ErrorStatistics,
     EvidenceOptions,
+    FindOptions,
+    FindResult,
+    FoundPart,
     GncOptions,
     InvalidArgument,
     IoError,
@@ -53,6 +56,7 @@ from ._core import (
     LoopUpdate,
     MapOptions,
     PairConsistency,
+    PartEvidence,
     PointCloud,
     PoseEvidence,
     PoseGraphOptions,
@@ -91,7 +95,7 @@ from .files import (
     write_point_cloud,
 )
 from .fragments import FragmentSet
-from .localization import CHANGE_LABELS, change, load_map, locate, locate_batch, prepare_map
+from .localization import CHANGE_LABELS, change, find, load_map, locate, locate_batch, prepare_map
 from .loop_closure import LoopCloser
 from .preparation import prepare, prepare_batch
 from .registration import (
@@ -145,6 +149,9 @@ __all__ = [
     "Error",
     "ErrorStatistics",
     "EvidenceOptions",
+    "FindOptions",
+    "FindResult",
+    "FoundPart",
     "FragmentSet",
     "GncOptions",
     "InvalidArgument",
@@ -168,6 +175,7 @@ __all__ = [
     "MapScan",
     "MendedMap",
     "PairConsistency",
+    "PartEvidence",
     "PointCloud",
     "PoseEvidence",
     "PoseGraphOptions",
@@ -204,6 +212,7 @@ __all__ = [
     "default_context",
     "describe_backends",
     "evaluate_trajectory",
+    "find",
     "fit_calibration",
     "from_depth_image",
     "load_map",

@@ -17,6 +17,8 @@ from ._core import (
     ChangeOptions,
     ChangeResult,
     Context,
+    FindOptions,
+    FindResult,
     LocateOptions,
     LocateResult,
     MapOptions,
@@ -278,4 +280,59 @@ def change(
     return _core.find_changes(context, cloud, map, pose, options)
 
 
-__all__ = ["CHANGE_LABELS", "change", "load_map", "locate", "locate_batch", "prepare_map"]
+# Meshes get as many samples as any part needs, whatever their unit.
+_ANY_SCALE = PrepareOptions(voxel_size=0)
+
+
+def find(
+    part: Any,
+    scene: Any,
+    *,
+    part_normals: Any = None,
+    scene_viewpoints: Any = None,
+    options: FindOptions | None = None,
+    context: Context | None = None,
+) -> FindResult:
+    """Find the instances of a known part in a scene: bin picking, templates, furniture in rooms.
+
+    Parameters
+    ----------
+    part
+        Whatever `prepare` takes as points: a mesh (best), or a scan of the part.
+    scene
+        The same, in the unit of the part: a scan with its sensor at the origin of its frame, or with
+        scene_viewpoints.
+    part_normals : (N, 3) array, optional
+        That point outwards: the part is a model, as a mesh is.
+    scene_viewpoints : (V, 3) or (3,) array, "auto" or "none", optional
+        Sensor positions in the scene's frame, as for `prepare`.
+    options : FindOptions, optional
+    context : Context, optional
+
+    Returns
+    -------
+    FindResult
+        ``instances``: each with ``scene_from_part``, a confidence and its evidence. Nothing found is a
+        status, not an exception.
+
+    Raises
+    ------
+    ValueError
+        For a voxel size that does not suit the part, and a scene that must be in another unit.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> part = np.random.default_rng(1).random((2000, 3))
+    >>> gpureg.find(part, np.zeros((0, 3))).status
+    'too_few_scene_points'
+    """
+    options = checked(options, FindOptions, "options") or FindOptions()
+    context = context_of(context)
+    model = None if part_normals is None else "model"
+    of_part = core_cloud(part, part_normals, None, model, _ANY_SCALE, "part")
+    of_scene = core_cloud(scene, None, None, scene_viewpoints, _ANY_SCALE, "scene")
+    return _core.find(context, of_part, of_scene, options)
+
+
+__all__ = ["CHANGE_LABELS", "change", "find", "load_map", "locate", "locate_batch", "prepare_map"]

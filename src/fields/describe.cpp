@@ -6,6 +6,7 @@
 
 #include "fields/audit.hpp"
 #include "fields/evidence.hpp"
+#include "fields/find.hpp"
 #include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
 #include "fields/scale.hpp"
@@ -87,15 +88,16 @@ std::vector<StructText> texts() {
 }  // namespace
 
 std::vector<StructText> all_structs() {
-  return texts<
-      RegistrationOptions, PrepareOptions, CompatibilityOptions, QuadrupleOptions, RefineOptions,
-      EvidenceOptions, ConfidenceCalibration, LoopConsistencyOptions, pose_graph::Options,
-      pose_graph::GncOptions, pose_graph::LineProcessOptions, pose_graph::DriftOptions,
-      pose_graph::LoopNoiseOptions, pose_graph::SolverOptions, reconstruction::Options,
-      reconstruction::EdgeNoiseOptions, reconstruction::RefineOptions, reconstruction::AuditOptions,
-      loop_closure::Options, loop_closure::ProposalOptions, loop_closure::AcceptanceOptions,
-      localization::MapOptions, localization::LocateOptions, localization::ChangeOptions,
-      PoseEvidence, RegistrationStatistics, StageTimings, PrepareStatistics, PairConsistency>();
+  return texts<RegistrationOptions, PrepareOptions, CompatibilityOptions, QuadrupleOptions,
+               RefineOptions, EvidenceOptions, ConfidenceCalibration, LoopConsistencyOptions,
+               pose_graph::Options, pose_graph::GncOptions, pose_graph::LineProcessOptions,
+               pose_graph::DriftOptions, pose_graph::LoopNoiseOptions, pose_graph::SolverOptions,
+               reconstruction::Options, reconstruction::EdgeNoiseOptions,
+               reconstruction::RefineOptions, reconstruction::AuditOptions, loop_closure::Options,
+               loop_closure::ProposalOptions, loop_closure::AcceptanceOptions,
+               localization::MapOptions, localization::LocateOptions, localization::ChangeOptions,
+               localization::FindOptions, localization::PartEvidence, PoseEvidence,
+               RegistrationStatistics, StageTimings, PrepareStatistics, PairConsistency>();
 }
 
 }  // namespace gpureg::fields

@@ -33,8 +33,8 @@ TEST_F(Usage, HelpAndVersionAreNoErrors) {
 TEST_F(Usage, VerbsAndOptionsThatDoNotExist) {
   expect_refused(
       {}, {"no verb",
-           "register, batch, consistency, reconstruct, locate, change, audit, calibrate, evaluate, "
-           "evaluate-trajectory, evaluate-surface, report, view, generate, info"});
+           "register, batch, consistency, reconstruct, locate, find, change, audit, calibrate, "
+           "evaluate, evaluate-trajectory, evaluate-surface, report, view, generate, info"});
   expect_refused({"regsiter", "a", "b"}, {"regsiter", "register, batch"});
   expect_refused({"--bogus"}, {"--bogus"});
   expect_refused(with({"--sed", "3"}), {"--sed", "gpureg register --help"});

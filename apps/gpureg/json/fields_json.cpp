@@ -8,6 +8,7 @@
 #include <string>
 
 #include "fields/evidence.hpp"
+#include "fields/find.hpp"
 #include "fields/options.hpp"
 #include "fields/statistics.hpp"
 #include "gpureg/error.hpp"
@@ -119,6 +120,7 @@ struct Reader {
 Json to_json(const RegistrationOptions& options) { return written(options); }
 Json to_json(const RegistrationStatistics& statistics) { return written(statistics); }
 Json to_json(const PoseEvidence& evidence) { return written(evidence); }
+Json to_json(const localization::PartEvidence& evidence) { return written(evidence); }
 
 Json to_json(const StageTimings& timings) {
   Json json = written(timings);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "gpureg/evidence.hpp"
+#include "gpureg/find.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
 #include "json/json_fwd.hpp"
@@ -16,6 +17,7 @@ Json to_json(const RegistrationStatistics& statistics);
 Json to_json(const StageTimings& timings);       ///< milliseconds per stage, and their total
 Json to_json(const PrepareStatistics& prepare);  ///< counts, and "ms" per stage
 Json to_json(const PoseEvidence& evidence);
+Json to_json(const localization::PartEvidence& evidence);
 
 /// Reads the fields that are there; the others keep their values.
 /// @throws InvalidArgument naming a field whose value does not fit.

@@ -166,20 +166,23 @@ def conditional_logit(x, correct, modes_per_pair, weight):
     return Regression(weights, float(minimised(likelihood, np.array([-odds.mean()]))[0]))
 
 
-def monotone(x, y, weight):
-    """The additive regression; see SIGNS."""
+def monotone(x, y, weight, names=None, signs=SIGNS, steps_at=None):
+    """The additive regression of features with these names, by default those of pairs; see SIGNS.
+
+    steps_at: features whose quantiles the steps begin and end at; by default all of them."""
     weight = weight / weight.mean()
-    names = library()._confidence_feature_names()
+    names = library()._confidence_feature_names() if names is None else names
+    steps_at = x if steps_at is None else steps_at
     steps, columns, bounds = [], [], [(None, None)]
     for feature, name in enumerate(names):
-        knots = np.unique(np.quantile(x[:, feature], np.linspace(END, 1 - END, KNOTS)))
-        if name not in SIGNS or not np.ptp(knots) > MIN_SCALE:
+        knots = np.unique(np.quantile(steps_at[:, feature], np.linspace(END, 1 - END, KNOTS)))
+        if name not in signs or not np.ptp(knots) > MIN_SCALE:
             continue
         for start, end in itertools.pairwise(knots):
             if end - start > MIN_SCALE:
                 steps.append((feature, start, end))
                 columns.append(np.clip((x[:, feature] - start) / (end - start), 0, 1))
-                bounds.append((0, None) if SIGNS[name] > 0 else (None, 0))
+                bounds.append((0, None) if signs[name] > 0 else (None, 0))
     ramps = np.stack(columns, 1)
 
     def objective(p):

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "gpureg/find.hpp"
+
+namespace gpureg::localization {
+
+/// What the confidence of a part is a function of.
+enum class PartFeature : std::size_t {
+  supported,
+  violated,
+  occluded,
+  contour,
+  contour_length,
+  log_area,
+  residual,
+  log_weakest,
+  log_third_weakest,
+  log_votes,
+  rival,
+  count
+};
+constexpr std::size_t kPartFeatures = static_cast<std::size_t>(PartFeature::count);
+
+std::array<double, kPartFeatures> part_features(const PartEvidence& evidence);
+
+/// Logarithm of the odds that the pose is correct; monotone in every feature.
+double part_log_odds(const PartEvidence& evidence);
+double part_confidence(const PartEvidence& evidence);
+
+}  // namespace gpureg::localization
