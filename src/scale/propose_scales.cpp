@@ -111,7 +111,6 @@ std::vector<double> propose_scales(const Context& context, const PreparedLadder&
         all.push_back(
             {range.is_free() ? scale : std::clamp(scale, range.least, range.most), p.places});
     }
-  if (getenv("SCALE_DEBUG")) { auto b=all; std::sort(b.begin(), b.end(), [](auto& x, auto& y) { return x.places > y.places; }); std::vector<Support> d; for (auto& x : b) { bool near=false; for (auto& y : d) near = near || std::abs(x.scale/y.scale-1)<0.1; if (!near) d.push_back(x);} for (auto& x : d) fprintf(stderr," %.4g:%u", x.scale, x.places); fprintf(stderr, "\n"); }
   return distinct(std::move(all));
 }
 
