@@ -7,12 +7,16 @@
 #include <random>
 
 #include "sets/result_bytes.hpp"
+#include "support/member_count.hpp"
 #include "support/registration_result.hpp"
 #include "support/scan.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace gpureg::test {
 namespace {
+
+// A member that is new here belongs into result_bytes.cpp, and makes another kJournalVersion.
+static_assert(member_count<RegistrationResult>() == 15 && member_count<RegistrationMode>() == 6);
 
 using Mode = PairJournal::Mode;
 
