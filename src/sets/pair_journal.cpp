@@ -68,8 +68,7 @@ void check_settings(const Settings& before, const Settings& now) {
                                    [&n = name](const auto& other) { return other.first == n; });
     if (same == before.end()) throw OtherRun(name + " was not given");
     if (same->second == value) continue;
-    throw OtherRun(name + " was " + same->second + ", now " + value +
-                   "; give the same options");
+    throw OtherRun(name + " was " + same->second + ", now " + value + "; give the same options");
   }
 }
 
@@ -214,8 +213,7 @@ void PairJournal::take_up(const RunIdentity& run) {
     const std::string names =
         "pair " + scan.clouds[pair.target].name + " " + scan.clouds[pair.source].name;
     const auto found = place.find({target, source});
-    if (found == place.end())
-      throw OtherRun(names + " is none of this run; give the same pairs");
+    if (found == place.end()) throw OtherRun(names + " is none of this run; give the same pairs");
     if (done(found->second))
       throw DamagedJournal(path_ + " is damaged: " + names + " is there twice");
     places_[found->second] = {pair.at, pair.size};
