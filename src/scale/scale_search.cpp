@@ -238,7 +238,7 @@ ScaledResult search_scale(const Context& context, const PreparedLadder& source,
   if (out.scale_status == ScaleStatus::none) return out;
   if (best.refined.stiffness < kLeastStiffness) {
     out.scale_status = ScaleStatus::not_observable;
-    if (out.aligned()) refuse(out, RegistrationReason::underconstrained);
+    refuse(out, RegistrationReason::underconstrained);
   } else if (out.aligned() && out.result.symmetry_confidence() < options.min_confidence) {
     refuse(out, RegistrationReason::ambiguous);
   }
