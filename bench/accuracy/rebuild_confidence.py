@@ -6,8 +6,8 @@ src/confidence/confidence_model.hpp and bench/results/confidence.json.
 
 Manifest: `scenes` by name, each with its building and one source: `data` (a folder under --data),
 `generate` (options of `gpureg generate`, with `mesh`: on that mesh), or `from`, `script` and
-`options` (a script of bench/accuracy on another scene). `meshes`: a file of a public repository at a
-commit, and options of gazebo_building.py. `runs`: groups with scenes, seeds, voxel size (metres),
+`options` (a script of bench/accuracy on another scene). `meshes`: a script of bench/accuracy and its
+options, or a file of a public repository at a commit and options of gazebo_building.py. `runs`: groups with scenes, seeds, voxel size (metres),
 viewpoints (known, origin, none), label (row of the table), and role: `fit` (all regressions),
 `beside` (the probability that a pose is correct), `tested` (none).
 
@@ -95,9 +95,10 @@ def check(manifest):
         if "from" in scene and not (HERE / scene["script"]).exists():
             complaints.append(f"scene {name}: there is no script {scene['script']}")
     for name, mesh in meshes.items():
-        complaints += [
-            f"mesh {name}: no {key}" for key in ("repository", "commit", "world") if key not in mesh
-        ]
+        keys = ("options",) if "script" in mesh else ("repository", "commit", "world")
+        complaints += [f"mesh {name}: no {key}" for key in keys if key not in mesh]
+        if "script" in mesh and not (HERE / mesh["script"]).exists():
+            complaints.append(f"mesh {name}: there is no script {mesh['script']}")
     for run in runs_of(manifest):
         if run.name in names:
             complaints.append(f"run {run.name}: twice")
@@ -141,9 +142,12 @@ class Inputs:
         return self.work / "results" / f"{run.file}.json"
 
     def mesh_command(self, name, out):
-        mesh, checkout = self.manifest["meshes"][name], self.checkout(name)
+        mesh = self.manifest["meshes"][name]
+        if "script" in mesh:
+            return [sys.executable, HERE / mesh["script"], *mesh["options"], "-o", out]
+        checkout = self.checkout(name)
         models = [checkout / folder for folder in mesh.get("models", [])]
-        words = [sys.executable, HERE / "gazebo_building.py", checkout / mesh["world"]]
+        words = [sys.executable, HERE / "buildings/gazebo_building.py", checkout / mesh["world"]]
         words += ["--models", *models] if models else []
         return [*words, *mesh.get("options", []), "-o", out]
 
@@ -260,6 +264,8 @@ def missing(inputs, runs):
             out[name] = out[scene["from"]]
         elif "mesh" in scene and not made(inputs, name) and not inputs.mesh(scene["mesh"]).exists():
             of = inputs.manifest["meshes"][scene["mesh"]]
+            if "script" in of:
+                continue
             if not fetch(inputs, scene["mesh"]):
                 out[name] = f"mesh: {of['repository']}@{of['commit']} {of['world']}"
             elif shutil.which("assimp") is None:

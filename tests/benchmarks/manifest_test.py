@@ -50,8 +50,9 @@ class Manifest(unittest.TestCase):
         for name in self.manifest["scenes"]:
             command = self.inputs.scene_command(name, pathlib.Path("out"))
             self.assertEqual(command is None, "data" in self.manifest["scenes"][name])
-        for name in self.manifest["meshes"]:
-            self.assertIn("gazebo_building.py", str(self.inputs.mesh_command(name, "out")))
+        for name, mesh in self.manifest["meshes"].items():
+            script = mesh.get("script", "gazebo_building.py")
+            self.assertIn(script, str(self.inputs.mesh_command(name, "out")))
         for run in self.runs:
             self.assertIn("--voxel-size", self.inputs.batch_command(run))
 
@@ -79,10 +80,16 @@ class Manifest(unittest.TestCase):
                 "no script moon.py",
             ),
             (lambda m: m["meshes"]["house"].pop("commit"), "mesh house: no commit"),
+            (lambda m: m["meshes"]["racks1"].update(script="moon.py"), "no script moon.py"),
+            (lambda m: m["meshes"]["racks1"].pop("options"), "mesh racks1: no options"),
         ):
             manifest = copy.deepcopy(self.manifest)
             change(manifest)
             self.assertIn(expected, "\n".join(rebuild.check(manifest)))
+
+    def test_a_mesh_of_a_script_is_never_missing(self):
+        runs = [run for run in self.runs if run.scene == "racks/1"]
+        self.assertEqual(rebuild.missing(self.inputs, runs), {})
 
     def test_missing_data_is_named(self):
         runs = [run for run in self.runs if run.scene in ("house/A", "unknown/house/A", "gen401")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""bench/accuracy/gazebo_building.py: one mesh of a world, every part where the world has it."""
+"""bench/accuracy/buildings/gazebo_building.py: one mesh of a world, every part where the world has it."""
 
 import pathlib
 import shutil
@@ -12,7 +12,7 @@ import pytest
 trimesh = pytest.importorskip("trimesh")
 pytestmark = pytest.mark.skipif(shutil.which("assimp") is None, reason="needs the command assimp")
 
-SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "bench/accuracy/gazebo_building.py"
+SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "bench/accuracy/buildings/gazebo_building.py"
 
 WORLD = """<sdf version="1.6"><world name="w">
 <model name="plate"><link name="l"><visual name="v"><geometry><plane><normal>0 0 1</normal><size>50 50</size></plane></geometry></visual></link></model>
