@@ -212,7 +212,9 @@ def _bolt(r):
         flat = np.maximum(q[:, 0] * 0.8660254 + q[:, 1] * 0.5, q[:, 1]) - b
         return np.maximum(flat, np.abs(p[:, 2]) - 0.09)
 
-    return union(hexagon, cylinder((0, 0, length / 2), a, length), cylinder((0, 0, 0.1), 1.25 * b, 0.05))
+    return union(
+        hexagon, cylinder((0, 0, length / 2), a, length), cylinder((0, 0, 0.1), 1.25 * b, 0.05)
+    )
 
 
 def _lever(r):

@@ -133,6 +133,44 @@ def row_of(gpureg, context, arguments, kind, seed, count):
     }
 
 
+def opencv_row(arguments, kind, seed, count):
+    """Point pair features of OpenCV (surface_matching, Drost et al. 2010), refined by its ICP."""
+    import cv2
+
+    triangles, diameter, points, truth = scene_of(kind, seed, count, arguments.data)
+    surface, normals = shapes.sample(triangles, 4000, np.random.default_rng(1))
+    ppf = cv2.ppf_match_3d
+    begin = time.perf_counter()
+    detector = ppf.PPF3DDetector(0.05, 0.05)
+    detector.trainModel(np.c_[surface, normals].astype(np.float32))
+    thin = points[scenes.thin(points, diameter / 20)]
+    _, scene = ppf.computeNormalsPC3d(thin.astype(np.float32), 12, True, np.zeros(3))
+    poses = detector.match(scene, 1 / 5, 0.05)[:100]
+    ppf.ICP(100, 0.005, 2.5, 8).registerModelToScene(
+        np.c_[surface, normals].astype(np.float32), scene, poses
+    )
+    seconds = time.perf_counter() - begin
+    scorer, taken, found, kept = Truth(triangles, diameter, truth), set(), [], []
+    for pose in poses:
+        if any(np.linalg.norm(pose.pose[:3, 3] - k) < diameter / 4 for k in kept):
+            continue  # one pose for each instance
+        kept.append(pose.pose[:3, 3])
+        at = scorer.instance_at(pose.pose)
+        correct = at is not None and at not in taken
+        taken |= {at} if correct else set()
+        found.append({"confidence": float(pose.numVotes), "instance": at if correct else -1})
+    return {
+        "kind": kind,
+        "seed": seed,
+        "count": count,
+        "view": True,
+        "seconds": seconds,
+        "device": "opencv",
+        "visible": [round(float(s), 4) for _, s in truth],
+        "found": found,
+    }
+
+
 def ranked(rows):
     """(confidence, correct, is of a visible instance) of all poses, the most confident first, and the number of
     visible instances."""
@@ -205,12 +243,22 @@ def main():
     parser.add_argument("--quality", type=int, default=5)
     parser.add_argument("--backend", default="cpu", choices=("cpu", "cuda"))
     parser.add_argument("--unseen", action="store_true", help="without the viewpoint of the scene")
+    parser.add_argument(
+        "--peer", choices=("opencv",), help="needs opencv-contrib-python; its scores are votes"
+    )
     parser.add_argument("--data", default="shared/data", help="folder with cad")
     parser.add_argument("--output", help="record, a row a line; rows that it has are not run again")
     arguments = parser.parse_args()
-    import gpureg
+    if arguments.peer:
+        run = opencv_row
+    else:
+        import gpureg
 
-    context = gpureg.Context.cuda() if arguments.backend == "cuda" else gpureg.Context.cpu()
+        context = gpureg.Context.cuda() if arguments.backend == "cuda" else gpureg.Context.cpu()
+
+        def run(*of):
+            return row_of(gpureg, context, *of)
+
     cad = ["Base-Top_Plate", "Guitar", "Range_Hood", "Round-Peg"]
     kinds = {"all": list(shapes.KINDS), "cad": cad}.get(arguments.kinds) or arguments.kinds.split(
         ","
@@ -227,7 +275,7 @@ def main():
             for count in map(int, arguments.counts.split(",")):
                 if (kind, seed, count, not arguments.unseen) in done:
                     continue
-                row = row_of(gpureg, context, arguments, kind, seed, count)
+                row = run(arguments, kind, seed, count)
                 rows.append(row)
                 if path:
                     with path.open("a") as file:

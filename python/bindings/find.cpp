@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 
 #include <pybind11/stl.h>
 

@@ -176,3 +176,35 @@ def test_wrong_arguments(two_rooms: gpureg.PreparedMap) -> None:
         gpureg.prepare_map([scan], np.eye(4))
     with pytest.raises(gpureg.InvalidArgument, match="no points"):
         gpureg.prepare_map(np.zeros((0, 3)))
+
+
+def test_part_in_a_scene() -> None:
+    rng = np.random.default_rng(1)
+
+    def step(count: int) -> tuple[Any, Any]:
+        """A base and a wall at its end, with normals."""
+        boxes = [([0, 0, 0.01], [0.08, 0.05, 0.02]), ([-0.03, 0, 0.035], [0.02, 0.05, 0.03])]
+        at = rng.uniform(-1, 1, (2, count, 3))
+        normals = np.zeros((2, count, 3))
+        for k, axis in enumerate(rng.integers(0, 3, count)):
+            for b in range(2):
+                at[b, k, axis] = normals[b, k, axis] = 1 if k % 2 else -1
+        points = [np.array(c) + a * np.array(s) / 2 for a, (c, s) in zip(at, boxes, strict=True)]
+        return np.concatenate(points), normals.reshape(-1, 3)
+
+    part, normals = step(4000)
+    truth = pose()
+    floor = np.c_[rng.uniform(-0.15, 0.15, (15000, 2)), np.zeros(15000)]
+    scene = moved(np.concatenate([part[normals[:, 2] > -0.5], floor]), truth)
+    options = gpureg.FindOptions(min_confidence=0, quality=2)
+    result = gpureg.find(
+        part, scene, part_normals=normals, scene_viewpoints="none", options=options
+    )
+    assert result.status == "found"
+    assert "found" in result.explanation
+    best = result.instances[0]
+    assert np.allclose(best.scene_from_part, truth, atol=0.01)  # two voxels; angles of 0.01
+    assert not best.evidence.viewpoint_known
+    assert gpureg.find(part, scene[:5], part_normals=normals).status == "too_few_scene_points"
+    with pytest.raises(ValueError, match="quality"):
+        gpureg.find(part, scene, options=gpureg.FindOptions(quality=11))

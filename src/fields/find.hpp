@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fields/options.hpp"
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 
 namespace gpureg::fields {
 

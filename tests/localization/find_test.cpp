@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 
 #include <gtest/gtest.h>
 
@@ -56,7 +56,7 @@ PointCloud model_of(const std::vector<Box>& boxes) {
   std::mt19937 random(1);
   const auto uniform = [&] { return static_cast<double>(random()) / 2147483648.0 - 1; };
   for (const Box& box : boxes)
-    for (int k = 0; k < 2500; ++k) {
+    for (int k = 0; k < 6000; ++k) {
       const int axis = k % 3;
       const double side = k % 2 == 0 ? 1 : -1;
       Eigen::Vector3d at(uniform(), uniform(), uniform());
@@ -186,6 +186,27 @@ TEST(FindPart, WithoutAViewpointTheSurfaceAloneDecides) {
   ASSERT_FALSE(result.instances.empty());
   EXPECT_FALSE(result.instances.front().evidence.viewpoint_known);
   EXPECT_LT(error(result.instances.front(), bodies.front()), 0.002);
+}
+
+TEST(FindPart, PosesThatASymmetryMakesEqualAreOneInstance) {
+  const std::vector<Box> box{{{0, 0, .015}, {.04, .025, .015}}};
+  const std::vector<Body> bodies{{box, placed(.4, 0, {-.08, .04, 0})},
+                                 {box, placed(1.9, 0, {.07, -.03, 0})}};
+  const FindResult result = find(context(), model_of(box).view(), scene_of(bodies).view());
+  const Eigen::Vector3d middle(0, 0, .015);
+  std::uint32_t equivalent = 0;
+  for (const Body& body : bodies) {
+    int here = 0;
+    for (const FoundPart& found : result.instances) {
+      const Eigen::Vector3d truth = camera_from_world() * body.pose * middle;
+      if ((found.scene_from_part * middle - truth).norm() > 0.02) continue;
+      EXPECT_LT((found.scene_from_part * middle - truth).norm(), 0.002);
+      ++here;
+      equivalent += found.equivalent_poses;
+    }
+    EXPECT_EQ(here, 1);
+  }
+  EXPECT_GT(equivalent, 0u);
 }
 
 TEST(FindPart, AHiddenPartSupportsLessAndIsOccluded) {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "gpureg/evidence.hpp"
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
 #include "json/json_fwd.hpp"

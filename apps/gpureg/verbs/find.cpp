@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 
 #include <algorithm>
 #include <array>
@@ -128,6 +128,14 @@ int run(const FindRun& o) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   print(o, context, result);
+  const auto unseen = [](const std::vector<FoundPart>& parts) {
+    return !parts.empty() && !parts.front().evidence.viewpoint_known;
+  };
+  if (unseen(result.instances) || unseen(result.doubtful))
+    std::cerr << "gpureg: note: " << o.scene
+              << ": it is not known from where it was seen, so confidences are low: --viewpoint "
+                 "x,y,z, as 0,0,0 where the sensor is at the origin"
+              << std::endl;
   if (result.status == FindStatus::not_found)
     std::cout << "try      --quality 10; is the scene in the unit of the part, and its sensor at "
                  "the origin of its frame (else --viewpoint)?\n";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,6 +25,9 @@ namespace {
 constexpr double kVoxels = 20;
 /// Voxels are not narrower than so many spacings of the scene, those of the evidence than ...
 constexpr double kSpacings = 1.5, kFineSpacings = 1.2;
+/// ... and so many of a part: its surface must have no holes, and points at random are twice as far
+/// apart on average as nearest neighbours are.
+constexpr double kPartSpacings = 2.9;
 /// Radius of the pieces of a scene and the distance of their middles, in diameters of the part.
 constexpr double kPieceRadius = 0.6, kPieceDistance = 0.3;
 /// A scene of more pieces than this is in another unit, or no scene.
@@ -32,7 +35,7 @@ constexpr double kMostPieces = 2e7;
 /// Poses whose parts are so close, RMS over the diameter, are one.
 constexpr double kSamePose = 0.03, kSameAfterRefinement = 0.02;
 /// Poses whose log odds are this far below even odds are neither refined nor rivals.
-constexpr double kHopeless = -5;
+constexpr double kHopelessPose = -5;
 constexpr std::size_t kMostRefined = 400;
 /// Searches of what the likely instances leave, and their log odds.
 constexpr int kRepetitions = 1;
@@ -122,7 +125,7 @@ std::vector<Eigen::Vector3f> thinned(const PointCloudView& scene, float voxel) {
 }
 
 /// What belongs to one part and one scene.
-struct Search {
+struct PartSearch {
   const Context& context;
   const PreparedCloud& part;
   const RegistrationOptions& registration;
@@ -134,7 +137,7 @@ struct Search {
 };
 
 /// Poses that alignments with the pieces of a scene end in, refined and judged.
-std::vector<Hypothesis> hypotheses_in(const Search& s, const SearchedScene& scene,
+std::vector<Hypothesis> hypotheses_in(const PartSearch& s, const SearchedScene& scene,
                                       std::size_t& pieces) {
   std::vector<PartCandidate> found = search_pieces(
       s.context, s.part, scene, {kPieceRadius * s.diameter, kPieceDistance * s.diameter},
@@ -150,7 +153,7 @@ std::vector<Hypothesis> hypotheses_in(const Search& s, const SearchedScene& scen
   }
   all = distinct(s.verifier, std::move(all), kSamePose * s.diameter);
   judge(s.verifier, s.threads, all);
-  while (!all.empty() && (all.size() > kMostRefined || all.back().log_odds < kHopeless))
+  while (!all.empty() && (all.size() > kMostRefined || all.back().log_odds < kHopelessPose))
     all.pop_back();
   for_each_on(s.threads, all.size(),
               [&](std::size_t k) { all[k].pose = s.verifier.refined(all[k].pose); });
@@ -257,8 +260,9 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
         "voxel_size is " + shown(out.voxel_size, 3) + ", but the part extends over " +
         shown(out.diameter, 3) + " only: expected a twentieth of it" +
         (options.voxel_size == 0 ? ", and a scene whose points are as close" : ""));
-  const float fine = static_cast<float>(
-      std::max(static_cast<double>(out.voxel_size) / 2, kFineSpacings * spacing));
+  const double of_part = suggest_voxel_size({outer.view()}).spacing;
+  const float fine = static_cast<float>(std::max(
+      {static_cast<double>(out.voxel_size) / 2, kFineSpacings * spacing, kPartSpacings * of_part}));
 
   // The search.
   RegistrationOptions registration =
@@ -299,15 +303,16 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
   const std::vector<Eigen::Vector3f> raw = thinned(scene, fine / 2);
   for (const Eigen::Vector3f& viewpoint : searched.viewpoints) views.emplace_back(raw, viewpoint);
   const PartVerifier verifier(surface, scene_surface, views, fine);
+  // Normals of a model are exact at edges, too.
+  const bool exact = !outer.normals.empty();
   std::vector<Vec3> points, normals;
-  for (std::size_t k = 0; k < surface.points.size(); ++k) {
-    const Eigen::Vector3f &p = surface.points[k], &n = surface.normals[k];
+  for (const Eigen::Vector3f& p : exact ? outer.points : surface.points)
     points.push_back({p.x(), p.y(), p.z()});
+  for (const Eigen::Vector3f& n : exact ? outer.normals : surface.normals)
     normals.push_back({n.x(), n.y(), n.z()});
-  }
   CloudSymmetry symmetry(points, normals, 1.5f * fine);
-  const Search search{context,      part_cloud,   registration,    verifier, scene_surface,
-                      out.diameter, outer.origin, searched.origin, threads};
+  const PartSearch search{context,      part_cloud,   registration,    verifier, scene_surface,
+                          out.diameter, outer.origin, searched.origin, threads};
   std::vector<Hypothesis> all = hypotheses_in(search, searched, out.neighborhoods), instances;
   for (int round = 0;; ++round) {
     instances = instances_of(verifier, symmetry, out.diameter, all);

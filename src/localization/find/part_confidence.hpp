@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 
 namespace gpureg::localization {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "gpureg/find.hpp"
+#include "gpureg/localization/find.hpp"
 #include "localization/find/part_surface.hpp"
 #include "localization/find/scene_surface.hpp"
 

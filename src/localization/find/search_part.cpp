@@ -10,9 +10,9 @@ namespace gpureg::localization {
 namespace {
 
 /// Points of pieces that are prepared and aligned together.
-constexpr std::size_t kPointsAtOnce = 400'000;
+constexpr std::size_t kPiecePointsAtOnce = 400'000;
 /// Pieces with fewer points hold no part.
-constexpr std::size_t kFewestPoints = 20;
+constexpr std::size_t kFewestPiecePoints = 20;
 
 Vec3 vec3(const Eigen::Vector3f& p) { return {p.x(), p.y(), p.z()}; }
 
@@ -32,9 +32,9 @@ bool is_plane(const std::vector<Eigen::Vector3f>& normals, const std::vector<std
 }
 
 /// Points by cells as wide as a radius.
-class Cells {
+class PieceCells {
  public:
-  Cells(const std::vector<Eigen::Vector3f>& points, float radius)
+  PieceCells(const std::vector<Eigen::Vector3f>& points, float radius)
       : points_(points), radius_(radius), inverse_(1 / radius) {
     for (std::uint32_t k = 0; k < points.size(); ++k)
       order_.emplace_back(cell_key(cell_of(vec3(points[k]), inverse_)), k);
@@ -67,7 +67,7 @@ class Cells {
 
 std::vector<std::uint32_t> middles_of_pieces(const std::vector<Eigen::Vector3f>& points,
                                              double distance) {
-  const Cells cells(points, static_cast<float>(distance));
+  const PieceCells cells(points, static_cast<float>(distance));
   std::vector<char> covered(points.size(), 0);
   std::vector<std::uint32_t> out;
   for (std::uint32_t k = 0; k < points.size(); ++k) {
@@ -81,7 +81,7 @@ std::vector<std::uint32_t> middles_of_pieces(const std::vector<Eigen::Vector3f>&
 std::vector<PartCandidate> search_pieces(const Context& context, const PreparedCloud& part,
                                          const SearchedScene& scene, const PieceSizes& sizes,
                                          const RegistrationOptions& options, std::size_t& pieces) {
-  const Cells cells(scene.points, static_cast<float>(sizes.radius));
+  const PieceCells cells(scene.points, static_cast<float>(sizes.radius));
   std::vector<PointCloud> clouds;
   std::size_t points = 0;
   std::vector<PartCandidate> out;
@@ -112,7 +112,7 @@ std::vector<PartCandidate> search_pieces(const Context& context, const PreparedC
     piece.viewpoints = scene.viewpoints;
     std::vector<std::uint32_t> rows;
     cells.within(scene.points[middle], [&](std::uint32_t k) { rows.push_back(k); });
-    if (rows.size() < kFewestPoints || is_plane(scene.normals, rows)) continue;
+    if (rows.size() < kFewestPiecePoints || is_plane(scene.normals, rows)) continue;
     std::sort(rows.begin(), rows.end());
     for (const std::uint32_t k : rows) {
       piece.points.push_back(scene.points[k]);
@@ -120,7 +120,7 @@ std::vector<PartCandidate> search_pieces(const Context& context, const PreparedC
     }
     points += rows.size();
     clouds.push_back(std::move(piece));
-    if (points >= kPointsAtOnce) align_those();
+    if (points >= kPiecePointsAtOnce) align_those();
   }
   if (!clouds.empty()) align_those();
   return out;
