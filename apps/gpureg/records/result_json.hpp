@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "gpureg/context.hpp"
-#include "gpureg/result.hpp"
 #include "gpureg/registration/scale.hpp"
+#include "gpureg/result.hpp"
 #include "json/fields_json.hpp"
 
 namespace gpureg::cli {
