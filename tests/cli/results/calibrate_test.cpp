@@ -257,11 +257,12 @@ TEST_F(CalibrateVerb, EveryVerbMapsItsConfidences) {
   EXPECT_NEAR(score_of(registered(file, verify), "r.json"),
               mapped(score_of(registered("", verify), "r.json")), 1e-9);
 
-  std::vector<std::string> batch = joined(
-      {"batch", folder_.path(), "-o", folder_ / "b.log", "--json", folder_ / "b.json", "--quiet"},
-      kSmall);
+  std::vector<std::string> batch =
+      joined({"batch", folder_.path(), "-o", folder_ / "b.log", "--json", folder_ / "b.json",
+              "--quiet", "--min-score", "0"},
+             kSmall);
   const double of_batch = score_of(batch, "b.json");
-  batch = joined(batch, {"--calibration", file, "--min-score", "0"});
+  batch = joined(batch, {"--calibration", file});
   EXPECT_NEAR(score_of(batch, "b.json"), mapped(of_batch), 1e-12);
   EXPECT_EQ(json_of(folder_ / "b.json")["options"]["calibration"]["offset"], -1.0);
 
