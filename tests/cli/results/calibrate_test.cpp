@@ -236,7 +236,7 @@ TEST_F(CalibrateVerb, EveryVerbMapsItsConfidences) {
   const std::string file = folder_.write("calibration.json", good().dump());
   const auto score_of = [&](const std::vector<std::string>& words, const char* pairs) {
     const Outcome outcome = run(words);
-    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_LE(outcome.status, 1) << outcome.err;  // 1: too little for a map
     const json document = json_of(folder_ / pairs);
     return document.contains("result") ? document["result"]["score"].get<double>()
                                        : document["pairs"][0]["score"].get<double>();
