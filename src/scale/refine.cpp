@@ -11,11 +11,11 @@ constexpr int kIterations = 16;
 /// The kernel of the weights starts that much wider, and narrows by this factor per iteration.
 constexpr double kWide = 4, kNarrow = 0.8;
 /// Largest distance of a correspondence, in widths of the kernel.
-constexpr double kReach = 3;
+constexpr double kIcpReach = 3;
 constexpr std::size_t kLeastMatches = 40;
 /// While the kernel is wide, so many points are one.
 constexpr int kStride = 4;
-constexpr double kSettled = 1e-4;  ///< change of the logarithm of the scale
+constexpr double kStepSettled = 1e-4;  ///< change of the logarithm of the scale
 /// Cosine of the largest angle between the normals of a correspondence.
 constexpr double kLeastCosine = 0.8;
 
@@ -166,7 +166,7 @@ RefinedScale refine_scale(const ClosestSurface& source, const ClosestSurface& ta
   double width = kWide * narrow;
   for (int iteration = 0; iteration <= kIterations; ++iteration) {
     const int stride = width > narrow ? kStride : 1;
-    const double reach = std::min(kReach * width, static_cast<double>(target.distance()));
+    const double reach = std::min(kIcpReach * width, static_cast<double>(target.distance()));
     std::vector<Match> matches;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     const auto add = [&](const Eigen::Vector3d& moved, const Eigen::Vector3d& fixed,
@@ -215,7 +215,7 @@ RefinedScale refine_scale(const ClosestSurface& source, const ClosestSurface& ta
     shift = centre + step.segment<3>(3) + grow * (r * (shift - centre));
     rotation = r * rotation;
     factor *= grow;
-    if (std::abs(step[6]) < kSettled && width == narrow) {
+    if (std::abs(step[6]) < kStepSettled && width == narrow) {
       out.factor = factor;
       return out;
     }

@@ -20,7 +20,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
 
-extern char** environ;
+extern "C" char** environ;
 
 namespace gpureg::cli {
 namespace {

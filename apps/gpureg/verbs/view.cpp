@@ -21,7 +21,7 @@
 #include "text.hpp"
 #include "verbs/report.hpp"
 
-extern char** environ;
+extern "C" char** environ;
 
 namespace gpureg::cli {
 namespace {
