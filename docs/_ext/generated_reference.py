@@ -31,11 +31,12 @@ def included_by(header: str) -> set[str]:
 
 
 def header_page(stem: str) -> str:
-    """A folder of the same name holds the parts of a header."""
-    include = f"```cpp\n#include <gpureg/{stem}.hpp>\n```\n"
+    """A folder of the same name holds the parts of a header, or headers of one subject."""
+    whole = [f"{stem}.hpp"] if (HEADERS / f"{stem}.hpp").exists() else []
     parts = sorted(f"{stem}/{path.name}" for path in (HEADERS / stem).glob("*.hpp"))
-    shown = "".join(f"\n```{{header}} {name}\n```\n" for name in [f"{stem}.hpp", *parts])
-    return f"# {stem}.hpp\n{include}{shown}"
+    included = "\n".join(f"#include <gpureg/{name}>" for name in whole or parts)
+    shown = "".join(f"\n```{{header}} {name}\n```\n" for name in [*whole, *parts])
+    return f"# {whole[0] if whole else stem}\n```cpp\n{included}\n```\n{shown}"
 
 
 def toctree(caption: str, stems: list[str]) -> str:
@@ -81,7 +82,8 @@ def write(path: pathlib.Path, text: str) -> None:
 
 def write_pages(app: Sphinx) -> None:
     (PAGES / "cpp").mkdir(exist_ok=True)
-    stems = sorted({path.stem for path in HEADERS.glob("*.hpp")} - {"gpureg"})
+    folders = {path.parent.name for path in HEADERS.glob("*/*.hpp")}
+    stems = sorted({path.stem for path in HEADERS.glob("*.hpp")} - {"gpureg"} | folders)
     for page in (PAGES / "cpp").glob("*.md"):
         if page.stem not in stems:
             page.unlink()

@@ -57,7 +57,7 @@ Settings settings_in(const std::string& text) {
   return out;
 }
 
-RunIdentity::Cloud cloud_in(const std::string& payload) {
+CloudIdentity cloud_in(const std::string& payload) {
   const std::size_t zero = std::min(payload.find('\0'), payload.size());
   return {payload.substr(0, zero), payload.substr(std::min(zero + 1, payload.size()))};
 }
@@ -75,7 +75,7 @@ void check_settings(const Settings& before, const Settings& now) {
 /// What is in a file, pair by pair.
 struct Scan {
   Settings settings;
-  std::vector<RunIdentity::Cloud> clouds;
+  std::vector<CloudIdentity> clouds;
   struct Found {
     std::uint32_t target, source;  // numbers of clouds
     std::uint64_t at;              // of the bytes of the result
@@ -201,7 +201,7 @@ void PairJournal::take_up(const RunIdentity& run) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> place;
   for (std::size_t k = 0; k < pairs_.size(); ++k) place[{pairs_[k].target, pairs_[k].source}] = k;
   const auto now = [&](std::uint32_t number) {
-    const RunIdentity::Cloud& cloud = scan.clouds[number];
+    const CloudIdentity& cloud = scan.clouds[number];
     const auto found = index.find(cloud.name);
     if (found == index.end()) throw OtherRun(cloud.name + " is not there any more; put it back");
     if (run.clouds[found->second].fingerprint != cloud.fingerprint)

@@ -55,6 +55,11 @@ struct MapInput {
   std::vector<Odometry> odometry;  ///< further relative poses that are known
 };
 
+/// Seconds that the steps of reconstruct() took.
+struct MapSeconds {
+  double prepare = 0, prune = 0, align = 0, graph = 0, surfaces = 0, refine = 0;
+};
+
 /// A map and all that it was made of.
 struct MapOfSet {
   std::vector<std::size_t> scans;               ///< fragments that could be used, ascending
@@ -70,9 +75,7 @@ struct MapOfSet {
   std::vector<Surface> surfaces;                ///< MapOptions::with_surfaces
   std::optional<RefineReport> refinement;       ///< none without MapOptions::with_refinement
   std::unique_ptr<PairJournal> journal;         ///< remove() it when the outputs are complete
-  struct {
-    double prepare = 0, prune = 0, align = 0, graph = 0, surfaces = 0, refine = 0;
-  } seconds;
+  MapSeconds seconds;
 };
 
 /// The steps of reconstruct() whose progress is told.

@@ -15,15 +15,17 @@
 /// Component `sets`: the pairs of a set of clouds, in a file that survives every interruption.
 namespace gpureg {
 
+/// A cloud of a run.
+struct CloudIdentity {
+  std::string name;         ///< unique
+  std::string fingerprint;  ///< tells whether it is the one of before, as a hash of its file
+};
+
 /// What a run of pairs is of. Other clouds or other options make another run.
 struct RunIdentity {
   /// name, value: "options.seed", "1"
   std::vector<std::pair<std::string, std::string>> settings;
-  /// Unique names, and what tells whether a cloud is the one of before, as a hash of its file.
-  struct Cloud {
-    std::string name, fingerprint;
-  };
-  std::vector<Cloud> clouds;  ///< by index
+  std::vector<CloudIdentity> clouds;  ///< by index
 
   /// The settings of a run: every option by its name, the prior of all pairs, and the version of
   /// gpureg, as another one may give other bits.
@@ -67,9 +69,8 @@ class PairJournal {
   /// settings must be the same, and every pair with a result one of `pairs`.
   /// @param path empty: no file, for runs that need not go on; memory then holds the results.
   /// @param pairs distinct; indices into run.clouds.
-  /// @throws OtherRun, DamagedJournal, UnfinishedRun. IoError naming the file: it cannot be
-  /// written,
-  ///   or another process writes it.
+  /// @throws IoError naming the file: OtherRun, DamagedJournal or UnfinishedRun, it cannot be
+  ///   written, or another process writes it.
   PairJournal(const std::string& path, const RunIdentity& run, const std::vector<Pair>& pairs,
               Mode mode);
   ~PairJournal();
@@ -89,7 +90,7 @@ class PairJournal {
   bool done(std::size_t k) const { return places_[k].size > 0; }
 
   /// The result of pair k, read from the file; skipped if it is not done.
-  /// @throws DamagedJournal, IoError.
+  /// @throws IoError, also a DamagedJournal.
   RegistrationResult result(std::size_t k);
 
   /// Adds the result of pair k, which is not done; flush() hands all that were added to the system.
@@ -132,12 +133,12 @@ class PairJournal {
 /// Results of a finished or unfinished journal, without the run that it is of.
 struct JournalContents {
   std::vector<std::pair<std::string, std::string>> settings;
-  std::vector<RunIdentity::Cloud> clouds;
+  std::vector<CloudIdentity> clouds;
   std::vector<Pair> pairs;  ///< indices into clouds
   std::vector<RegistrationResult> results;
 };
 
-/// @throws IoError, DamagedJournal naming the file.
+/// @throws IoError naming the file, also a DamagedJournal.
 JournalContents read_journal(const std::string& path);
 
 /// Whether a file begins as a journal does.

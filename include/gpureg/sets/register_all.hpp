@@ -27,7 +27,7 @@ RunIdentity identity_of(const FragmentSet& fragments, const RegistrationOptions&
 /// @param gravity a prior of all pairs.
 /// @param callbacks on_progress receives the number of pairs that are done. should_stop ends the
 ///   call before the next chunk; what is done is in the journal.
-/// @throws InvalidArgument, DeviceError as align_batch(). IoError as PairJournal::add().
+/// @throws Error as align_batch() and PairJournal::add().
 void register_all(const Context& context, const std::vector<PreparedCloud>& clouds,
                   PairJournal& journal, const RegistrationOptions& options = {},
                   const std::optional<GravityPrior>& gravity = {},
@@ -80,8 +80,8 @@ struct RegisterAllReport {
 /// @param go_on called ten times a second in the calling thread, with the number of pairs that are
 ///   done and that of preparations so far; false ends the call as soon as the chunks that began are
 ///   done. What is done is in the journal. May be empty.
-/// @throws as above: the exception of the thread that failed first, or that of go_on, when no
-///   thread runs any more.
+/// @throws Error as above, of the thread that failed first, or what go_on throws, when no thread
+///   runs any more.
 RegisterAllReport register_all(
     const std::vector<Context>& contexts, const FragmentSet& fragments, PairJournal& journal,
     const RegistrationOptions& options = {}, std::size_t memory = kFragmentMemory,

@@ -18,7 +18,7 @@ class ScanFiles : public FragmentSet {
  public:
   /// @param path, recursive as for io::list_scans(); sensor positions are those of cameras.txt
   ///   beside the scans, else those of the files.
-  /// @throws IoError.
+  /// @throws IoError where the path has no scans.
   explicit ScanFiles(const std::string& path, bool recursive = false)
       : scans_(io::list_scans(path, recursive)) {
     const std::filesystem::path cameras =

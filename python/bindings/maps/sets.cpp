@@ -34,7 +34,7 @@ Journal open_journal(const std::string& path, const RegistrationOptions& options
 py::tuple contents_of(const std::string& path) {
   JournalContents contents = read_journal(path);
   std::vector<std::string> names;
-  for (const RunIdentity::Cloud& cloud : contents.clouds) names.push_back(cloud.name);
+  for (const CloudIdentity& cloud : contents.clouds) names.push_back(cloud.name);
   IndexArray rows({static_cast<py::ssize_t>(contents.pairs.size()), py::ssize_t(2)});
   std::uint32_t* next = rows.mutable_data();
   for (const Pair& pair : contents.pairs) {
