@@ -90,7 +90,7 @@ class PairJournal {
   bool done(std::size_t k) const { return places_[k].size > 0; }
 
   /// The result of pair k, read from the file; skipped if it is not done.
-  /// @throws IoError, also a DamagedJournal.
+  /// @throws IoError naming the file (also as DamagedJournal).
   RegistrationResult result(std::size_t k);
 
   /// Adds the result of pair k, which is not done; flush() hands all that were added to the system.
@@ -138,7 +138,7 @@ struct JournalContents {
   std::vector<RegistrationResult> results;
 };
 
-/// @throws IoError naming the file, also a DamagedJournal.
+/// @throws IoError naming the file (also as DamagedJournal).
 JournalContents read_journal(const std::string& path);
 
 /// Whether a file begins as a journal does.
