@@ -11,24 +11,20 @@ struct Similarity {
   float scale;
 };
 
+inline Vec3 centroid(const Vec3* p, int n) {
+  Vec3 sum{0, 0, 0};
+  for (int k = 0; k < n; ++k) sum = sum + p[k];
+  return sum * (1.0f / static_cast<float>(n));
+}
+
 /// Similarity of n point pairs: the rotation of fit_rigid(), and the symmetric scale of Horn 1987,
 /// the ratio of the spreads. That of least squares is too small where both sides have noise.
 /// False where they do not determine one.
 inline bool fit_similarity(const Vec3* p, const Vec3* q, int n, Similarity& out) {
-  if (n < 3) return false;
-  Vec3 cp{0, 0, 0}, cq{0, 0, 0};
-  for (int k = 0; k < n; ++k) {
-    cp = cp + p[k];
-    cq = cq + q[k];
-  }
-  const float inverse = 1.0f / static_cast<float>(n);
-  cp = cp * inverse;
-  cq = cq * inverse;
-  float s[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  for (int k = 0; k < n; ++k) add_covariance(p[k] - cp, q[k] - cq, s);
   Pose<float> pose;
-  if (!solve_rigid(s, cp, cq, pose)) return false;
+  if (!fit_rigid(p, q, n, pose)) return false;
   out.rigid = to_rigid(pose);
+  const Vec3 cp = centroid(p, n), cq = centroid(q, n);
   float other = 0, own = 0;
   for (int k = 0; k < n; ++k) {
     other += squared_norm(q[k] - cq);

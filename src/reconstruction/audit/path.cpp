@@ -22,9 +22,10 @@ constexpr double kLeastOfMode = 0.1;
 /// explained.
 constexpr double kLeastRejected = 0.04;
 /// Of the confidence of all pairs, at most this share is that of rejected ones where places differ,
-/// in maps with so many accepted pairs for each scan: 0 to 0.09 in 17 maps of houses, a ward, a
-/// kitchen and a furnished warehouse, 0.11 to 0.81 in 19 of offices, a flat, corridors, racks and
-/// garages. Maps of few pairs have more, as nothing confirms them.
+/// in maps with so many accepted pairs for each scan: 0 to 0.09 in 14 maps of houses, a ward, a
+/// kitchen and a furnished warehouse; 0.06 to 0.55 in 13 of an office, a flat, a bare warehouse,
+/// corridors, racks and garages, nine of them above. Maps of few pairs have more everywhere, as
+/// nothing confirms them.
 constexpr double kMostRejected = 0.15, kManyPairs = 2;
 /// Consecutive scans that are too far apart for one to be a pause of the sensor.
 constexpr std::size_t kSeveral = 2;
