@@ -6,6 +6,8 @@ that see them by ray casting. Every scene is a list of clouds with their poses a
 * `figures`: rounded shapes, range scans of them, and their models.
 * `objects`: rounded shapes, scanned from around them; pairs of scans.
 * `street`: a spinning LiDAR of 16 to 128 rings on a vehicle: ground, buildings, cars, trees, poles.
+* `blocks`: the same sensor in such a street, and the block model of it (boxes, Level of Detail 1) or of
+  another one.
 * `hall`: the same sensor, or a terrestrial scanner, in halls with columns, shelves and machines.
 
 Everything follows from a seed. Needs numpy, scipy, trimesh, embreex and manifold3d."""
@@ -32,6 +34,7 @@ class Scene(NamedTuple):
     voxel_size: str
     degrees: float  # a pose is correct within this angle ...
     distance: float  # ... and this distance of the middle of the source
+    model_points: int = 20000  # of a model that is given as points
 
 
 def truths(scene, source, target):
@@ -314,11 +317,10 @@ def facade(rng, length, depth, height):
 
 
 def town(rng, extent=160.0):
-    """A street along x, mostly with a crossing."""
-    pieces = []
+    """A street along x, mostly with a crossing: its mesh, its width, and the ground and the bodies of its houses."""
     grid = trimesh.creation.box([extent, extent, 0.2])
     grid.apply_translation([0, 0, -0.1])
-    pieces.append(grid)
+    pieces, bodies = [grid], [grid]
     width, built = rng.uniform(7, 14), rng.uniform(0.3, 0.95)
     crossing = rng.uniform(-20, 20) if rng.random() < 0.7 else np.inf
     for side in (-1, 1):
@@ -331,11 +333,13 @@ def town(rng, extent=160.0):
                 continue
             if rng.random() < built:
                 back = rng.uniform(0, 5)
-                for piece in facade(rng, length, rng.uniform(6, 12), rng.uniform(4, 15)):
+                house = facade(rng, length, rng.uniform(6, 12), rng.uniform(4, 15))
+                for piece in house:
                     if side < 0:
                         piece.apply_transform(rotation_about([0, 0, 1], np.pi))
                     piece.apply_translation([middle, side * (width / 2 + 2 + back), 0])
                     pieces.append(piece)
+                bodies.append(house[0])
             else:
                 for _ in range(int(rng.integers(0, 4))):
                     place = [
@@ -363,7 +367,7 @@ def town(rng, extent=160.0):
                     [rng.uniform(-0.45, 0.45) * extent, side * (width / 2 + 0.6), tall / 2]
                 )
             )
-    return trimesh.util.concatenate(pieces), width
+    return trimesh.util.concatenate(pieces), width, bodies
 
 
 def spread_pairs(scans, rng, positives, negatives, most):
@@ -383,6 +387,18 @@ def spread_pairs(scans, rng, positives, negatives, most):
     return [tuple(map(int, p)) for p in near[:positives] + far[:negatives]]
 
 
+def on_the_street(rng, width):
+    """Pose of a sensor on a vehicle."""
+    heading = rng.choice([0, np.pi]) + rng.normal(0, 0.15)
+    if rng.random() < 0.25:
+        heading += rng.uniform(-np.pi, np.pi)
+    pose = translation(
+        rng.uniform(-25, 25), rng.uniform(-0.3, 0.3) * (width - 4), rng.uniform(1.6, 2.1)
+    )
+    pose = pose @ rotation_about([0, 0, 1], heading)
+    return pose @ rotation_about(rng.normal(size=3), rng.normal(0, 0.02))
+
+
 def street(seed, rings=None):
     """rings: of the LiDAR; drawn where it is not given."""
     rng = np.random.default_rng(seed)
@@ -390,18 +406,40 @@ def street(seed, rings=None):
     rings = rings or drawn
     scans = []
     for place in range(2):
-        mesh, width = town(rng)
+        mesh, width, _ = town(rng)
         for _ in range(6):
-            heading = rng.choice([0, np.pi]) + rng.normal(0, 0.15)
-            if rng.random() < 0.25:
-                heading += rng.uniform(-np.pi, np.pi)
-            pose = translation(
-                rng.uniform(-25, 25), rng.uniform(-0.3, 0.3) * (width - 4), rng.uniform(1.6, 2.1)
-            )
-            pose = pose @ rotation_about([0, 0, 1], heading)
-            pose = pose @ rotation_about(rng.normal(size=3), rng.normal(0, 0.02))
+            pose = on_the_street(rng, width)
             scans.append(Scan(spin(mesh, pose, rings, rng), pose, None, place, (np.eye(4),)))
     return Scene(scans, spread_pairs(scans, rng, 16, 8, 30), "auto", 5.0, 1.0)
+
+
+def block_model(rng, bodies):
+    """The bodies as a city model has them: heights and fronts are off, and here and there a house is missing."""
+    kept = [bodies[0]]
+    for body in bodies[1:]:
+        if rng.random() < 0.07:
+            continue
+        kept.append(body.copy())
+        low, high = body.bounds
+        size = high - low
+        kept[-1].apply_translation(-low)
+        kept[-1].apply_scale((size + rng.normal(0, [0.2, 0.2, 0.5])).clip(1) / size)
+        kept[-1].apply_translation(low + [*rng.normal(0, 0.1, 2), 0])
+    return trimesh.util.concatenate(kept)
+
+
+def blocks(seed):
+    rng = np.random.default_rng(seed)
+    rings = int(rng.choice([16, 16, 32, 64]))
+    scans, models = [], []
+    for place in range(2):
+        mesh, width, bodies = town(rng)
+        for _ in range(3):
+            pose = on_the_street(rng, width)
+            scans.append(Scan(spin(mesh, pose, rings, rng), pose, None, place))
+        models.append(Scan(None, np.eye(4), block_model(rng, bodies), place))
+    pairs = [(k, len(scans) + m) for k in range(len(scans)) for m in range(len(models))]
+    return Scene(scans + models, pairs, str(rng.choice(["auto", "0.5"])), 5.0, 1.0, 400000)
 
 
 def hall_mesh(rng):
@@ -461,4 +499,11 @@ def hall(seed, scanner=None):
     return Scene(scans, spread_pairs(scans, rng, 16, 8, 20), "auto", 5.0, 0.5)
 
 
-SCENES = {"parts": parts, "figures": figures, "objects": objects, "street": street, "hall": hall}
+SCENES = {
+    "parts": parts,
+    "figures": figures,
+    "objects": objects,
+    "street": street,
+    "blocks": blocks,
+    "hall": hall,
+}

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Evidence of pairs of many kinds of data: what fit_models.py fits and domains_record.py tests the confidence with.
 
-A domain is a kind of sensor in a kind of place. Simulated ones: parts, figures, objects, street, hall
-(domain_scenes.py). Real ones, in DATA (its README.md has origins and licences): kitchen, dragon, cad,
+A domain is a kind of sensor in a kind of place. Simulated ones: parts, figures, objects, street, blocks,
+hall (domain_scenes.py). Real ones, in DATA (its README.md has origins and licences): kitchen, dragon, cad,
 cad_mesh, kitti, lidar, fgr (viewpoints.py). One file DOMAIN.json each: every pair with the evidence of
 its modes and which of them are correct, under one of the conditions of viewpoints.py (`said`,
 `nothing`, `still`).
@@ -26,9 +26,8 @@ import numpy as np
 import viewpoints
 from viewpoints import Cloud, Set
 
-SIMULATED = ("parts", "figures", "objects", "street", "hall")
+SIMULATED = ("parts", "figures", "objects", "street", "blocks", "hall")
 REAL = ("kitchen", "dragon", "cad", "cad_mesh", "kitti", "lidar", "fgr")
-MODEL_POINTS = 20000
 SCENE_STEP = 1000
 
 
@@ -49,7 +48,7 @@ def simulated(name, seed, **fixed):
             clouds.append(Cloud(scan.points, np.zeros((1, 3)), extent))
             continue
         triangles = np.asarray(scan.model.triangles)
-        points, _ = viewpoints.sampled(triangles, rng, MODEL_POINTS)
+        points, _ = viewpoints.sampled(triangles, rng, scene.model_points)
         clouds.append(Cloud(points, None, extent, triangles if as_mesh else None))
     pairs = [(s, t, domain_scenes.truths(scene, s, t)) for s, t in scene.pairs]
 

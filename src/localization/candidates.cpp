@@ -96,10 +96,7 @@ PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>&
   for (const Eigen::Vector3d& point : moved) cells.add(point);
   box.min().array() -= distance;
   box.max().array() += distance;
-  PointCloud out =
-      map.cut(box, [&](const Eigen::Vector3f& p) { return cells.has(p.cast<double>()); });
-  if (map.sides_inferred) out.normals.clear();
-  return out;
+  return map.cut(box, [&](const Eigen::Vector3f& p) { return cells.has(p.cast<double>()); });
 }
 
 double odds_of(double confidence) {

@@ -2,7 +2,6 @@
 #include "localization/verify_places.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "api/verify_by_surfaces.hpp"
 #include "common/for_each_on.hpp"
@@ -10,78 +9,24 @@
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
 #include "localization/plan/floor_plan.hpp"
-#include "math/exponential.hpp"
 
 namespace gpureg::localization {
 namespace {
 
-/// The log odds of a place by surfaces: a line in logarithms of the part of the scan without a
-/// surface of the map, of the part of the map in free space of the scan, and of the parts of both
-/// in front of surfaces of the other. The evidence of a pair may overlap little, but a scan that is
-/// in the map lies in it, and sees what the map has there. Fitted, with the weight of the log odds
-/// of the search of the plan, by bench/localization/fit_places.py.
-constexpr double kIntercept = -9.96, kOfUncovered = -0.56, kOfFreeSpace = -0.67, kOfFront = -1.29,
-                 kOfPlan = 0.48;
-/// The logarithms are of at least these shares.
-constexpr double kLeastUncovered = 0.01, kLeastFreeSpace = 0.002, kLeastFront = 0.004;
-/// Confidence of a search, and of its opposite, at least.
-constexpr double kLeastSearch = 1e-4;
-
-double surface_odds(const PoseVerification& pose) {
-  const PoseEvidence& e = pose.evidence;
-  const auto log_of = [](double share, double least) {
-    return portable::log(std::max(share, least));
-  };
-  return portable::exp(
-      kIntercept + kOfUncovered * log_of(1 - e.source_overlap_any_normal, kLeastUncovered) +
-      kOfFreeSpace * log_of(e.target_free_space_violation, kLeastFreeSpace) +
-      kOfFront *
-          log_of(e.source_front_violation_near + e.target_front_violation_near, kLeastFront));
-}
-
-double confidence_of_surfaces(const PoseVerification& pose) {
-  const double odds = surface_odds(pose);
-  return odds / (1 + odds);
-}
-
-/// Of a place that the plan of the map proposes.
-double confidence_of_planned(double searched, const PoseVerification& pose) {
-  const double c = std::clamp(searched, kLeastSearch, 1 - kLeastSearch);
-  const double odds = surface_odds(pose) * portable::exp(kOfPlan * portable::log(c / (1 - c)));
-  return odds / (1 + odds);
-}
-
-/// A tile proposes many places, of which the best is chosen by its evidence as a pair, so the
-/// doubts about it are greater: log odds that it loses with the part of the scan beyond a tenth
-/// that has no surface of the map beside it,
-constexpr double kContained = 0.9, kLogOddsOfRest = 8;
-/// with the part of the map that lies in free space of the scan, and with the parts of both in
-/// front of surfaces of the other, beyond what right places have; at most so many, as rooms change.
-constexpr double kInFreeSpace = 0.005, kLogOddsInFreeSpace = 150;
-constexpr double kInFront = 0.01, kLogOddsInFront = 100;
-constexpr double kMostLogOdds = 4;
-
-/// Log odds against a place. Sparse scans are contained in wide voxels at least.
-double doubt(const PoseVerification& fine, const PoseVerification& wide) {
-  const PoseEvidence& e = fine.evidence;
-  const double contained =
-      std::max(e.source_overlap_any_normal, wide.evidence.source_overlap_any_normal);
-  const auto beyond = [](double share, double usual) { return std::max(0.0, share - usual); };
-  const double contradicted =
-      kLogOddsInFreeSpace * beyond(e.target_free_space_violation, kInFreeSpace) +
-      kLogOddsInFront * (beyond(e.source_front_violation_near, kInFront) +
-                         beyond(e.target_front_violation_near, kInFront));
-  return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted);
-}
-
-/// Of a place that a tile proposes: the mean of the log odds of the search and of the pair, where
-/// it is more than that of the pair alone, less the doubt, and less those by surfaces that are
-/// against it.
-double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide) {
-  const double verified = odds_of(std::max(fine.confidence, wide.confidence));
-  const double odds = std::max(verified, std::sqrt(odds_of(searched) * verified)) *
-                      portable::exp(-doubt(fine, wide)) * std::min(1.0, surface_odds(fine));
-  return odds / (1 + odds);
+/// Sets the confidences of the places of a scan.
+void judge(const Scan& scan, const EvidenceOptions& options, bool planned,
+           std::vector<Verified>& places) {
+  std::vector<PlaceFeatures> features;
+  for (const Verified& v : places) features.push_back(v.features);
+  const std::vector<double> confidences =
+      place_confidences(features, planned, [&](std::size_t a, std::size_t b) {
+        return same_place(places[a].verification.target_from_source,
+                          places[b].verification.target_from_source, scan.middle, options);
+      });
+  for (std::size_t k = 0; k < places.size(); ++k) places[k].confidence = confidences[k];
+  std::stable_sort(places.begin(), places.end(), [](const Verified& a, const Verified& b) {
+    return a.confidence > b.confidence;
+  });
 }
 
 /// Sparse scans overlap little in narrow voxels: what is not sure there and possible in the wide
@@ -117,12 +62,6 @@ std::vector<PoseVerification> verify_coarsely(const Context& context, const MapS
       verify_poses_batch(context, clouds, pairs, poses, registration, verification);
   for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front();
   return out;
-}
-
-void sort(std::vector<Verified>& places) {
-  std::stable_sort(places.begin(), places.end(), [](const Verified& a, const Verified& b) {
-    return a.confidence > b.confidence;
-  });
 }
 
 /// Neighbourhoods that are cut out, and points that are prepared and compared, together.
@@ -190,7 +129,7 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
         *std::max_element(results[k].begin(), results[k].end(),
                           [](const auto& a, const auto& b) { return a.confidence < b.confidence; });
     out[begin[k].scan].push_back(
-        {candidate, pose, clouds[k].size(), confidence_of_planned(candidate.confidence, pose)});
+        {candidate, pose, clouds[k].size(), planned_features(candidate.confidence, pose), 0});
   }
 }
 
@@ -208,7 +147,7 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
     const auto known = std::find_if(before.begin(), before.end(), [&](const Verified& v) {
       return v.candidate.map_from_scan.matrix() == candidate.map_from_scan.matrix();
     });
-    out.push_back(known == before.end() ? Verified{candidate, {}, 0, 0} : *known);
+    out.push_back(known == before.end() ? Verified{candidate, {}, 0, {}, 0} : *known);
     if (known != before.end()) continue;
     open.push_back(out.size() - 1);
     around.push_back(neighborhood(map, scan.points, candidate.map_from_scan, options.neighborhood));
@@ -233,9 +172,9 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
   const auto coarse = verify_coarsely(context, map, options, scan, fine, around);
   for (std::size_t k = 0; k < results.size(); ++k) {
     Verified& v = out[open[k]];
-    v.confidence = confidence_of(v.candidate.confidence, v.verification, coarse[k]);
+    v.features = tile_features(v.candidate.confidence, v.verification, coarse[k]);
   }
-  sort(out);
+  judge(scan, options.registration.evidence, false, out);
   return out;
 }
 
@@ -263,7 +202,8 @@ std::vector<std::vector<Verified>> verify_planned(const Context& context, const 
       for (; begin < end; ++begin) places[begin].around = {};
     }
   }
-  for (std::vector<Verified>& of_scan : out) sort(of_scan);
+  for (std::size_t k = 0; k < out.size(); ++k)
+    judge(*scans[k], options.registration.evidence, true, out[k]);
   return out;
 }
 

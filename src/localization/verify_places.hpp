@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "localization/place_confidence.hpp"
 #include "localization/search.hpp"
 
 namespace gpureg::localization {
@@ -16,7 +17,8 @@ struct Verified {
   Candidate candidate;
   PoseVerification verification;
   std::size_t points = 0;  ///< of the neighbourhood
-  double confidence = 0;   ///< other places aside
+  PlaceFeatures features{};
+  double confidence = 0;  ///< other places aside
 };
 
 /// Verifies the candidates of scans, which the plan of the map proposes, by the surfaces of all of
