@@ -54,6 +54,7 @@ from confidence.regressions import (
     library,
     logistic,
     monotone,
+    signed_logistic,
 )
 
 MAX_ERROR = 0.2  # metres, Redwood's rule for a correct pose
@@ -331,11 +332,12 @@ def fit(runs, beside, model):
         x.append(run.features(model, "ranking", chosen))
         y.append(run.correct[chosen])
         weight.append(np.full(chosen.sum(), run.weight))
-    ranking = logistic(*map(np.concatenate, (x, y, weight)), strengths["ranking"])
+    regression_of = signed_logistic if model.model else logistic
+    ranking = regression_of(*map(np.concatenate, (x, y, weight)), strengths["ranking"])
 
     def of_best(of, regression, label):
         views = [best_modes(run, model, ranking) for run in of]
-        return logistic(
+        return regression_of(
             np.concatenate([x for x, _, _ in views]),
             np.concatenate([getattr(run, label)[best] for run, (_, best, _) in zip(of, views)]),
             np.concatenate([np.full(len(x), run.weight) for run, (x, _, _) in zip(of, views)]),

@@ -19,6 +19,10 @@ constexpr double kMinUncovered = 2e-2;
 /// free space is known, a sum of front violations of both sides below this tells which mode is the
 /// better one, and not whether it is correct.
 constexpr double kMinVerifiedFrontViolation = 2e-2;
+/// A model has what the scan saw through: things that were moved, or are not there yet.
+constexpr double kMinModelViolation = 1e-2;
+/// Normals of noisy scans of machined parts agree with those of the model to this part and more.
+constexpr double kNoisyOverlap = 0.4;
 /// Bounds the denominators of shares.
 constexpr double kMinDenominator = 1e-6;
 /// Bounds the log odds as features: beyond, modes are certain one way or the other.
@@ -116,16 +120,21 @@ void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regres
 }
 
 /// A scan lies on its model as a whole, and is the better covered side: the model has a back, and
-/// more of everything. Matches of features tell little: those of machined parts are few, and many
-/// by chance.
+/// more of everything. Where the scan saw through a part of the model, it is of something else.
+/// Matches of features tell little: those of machined parts are few, and many by chance.
 void add_containment(const PoseEvidence& e, Regressand regressand, Setter& set) {
   const Sides covered{e.source_overlap_any_normal, e.target_overlap_any_normal};
   set(Feature::log_uncovered, log_at_least(1 - covered.higher(), kMinUncovered));
   // How well normals agree depends on the noise of the scan, and tells which pose is the better
-  // one, not whether it is correct.
-  if (regressand == Regressand::confidence) return;
+  // one; whether it is correct, only where they hardly agree.
   const Sides weighted{e.source_normal_weighted_overlap, e.target_normal_weighted_overlap};
-  set(Feature::log_higher_weighted_overlap, log_at_least(weighted.higher(), kMinOverlap));
+  const bool ranked = regressand == Regressand::ranking;
+  set(Feature::log_higher_weighted_overlap,
+      log_at_least(ranked ? weighted.higher() : std::min(weighted.higher(), kNoisyOverlap),
+                   kMinOverlap));
+  if (ranked) return;
+  const Sides violation{e.source_free_space_violation, e.target_free_space_violation};
+  set(Feature::log_higher_violation, log_at_least(violation.higher(), kMinModelViolation));
 }
 
 constexpr const char* kNames[] = {"log_match_support",

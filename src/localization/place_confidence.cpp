@@ -45,6 +45,11 @@ PlaceFeatures surface_features(const PoseEvidence& e, double covered) {
   return out;
 }
 
+confidence::OverlapCount count(double share, std::size_t points) {
+  return {static_cast<std::uint32_t>(share * static_cast<double>(points)),
+          static_cast<std::uint32_t>(points)};
+}
+
 double log_odds(const PlaceRegression& regression, const PlaceFeatures& features) {
   double sum = regression.bias;
   for (std::size_t k = 0; k < kPlaceFeatures; ++k) sum += regression.weights[k] * features[k];
@@ -53,42 +58,46 @@ double log_odds(const PlaceRegression& regression, const PlaceFeatures& features
 
 }  // namespace
 
-PlaceFeatures planned_features(double searched, const PoseVerification& place) {
-  PlaceFeatures out = surface_features(place.evidence, place.evidence.source_overlap_any_normal);
-  at(out, PlaceFeature::search_log_odds) = logit(searched, kLeastSearch);
+PlaceEvidence planned_evidence(double searched, const PoseVerification& place, std::size_t points) {
+  const double covered = place.evidence.source_overlap_any_normal;
+  PlaceEvidence out{surface_features(place.evidence, covered), count(covered, points)};
+  at(out.features, PlaceFeature::search_log_odds) = logit(searched, kLeastSearch);
   return out;
 }
 
-PlaceFeatures tile_features(double searched, const PoseVerification& fine,
-                            const PoseVerification& wide) {
-  PlaceFeatures out = surface_features(
-      fine.evidence,
-      std::max(fine.evidence.source_overlap_any_normal, wide.evidence.source_overlap_any_normal));
-  at(out, PlaceFeature::search_log_odds) = logit(searched, kLeastSearch);
-  at(out, PlaceFeature::pair_log_odds) =
+PlaceEvidence tile_evidence(double searched, const PoseVerification& fine,
+                            const PoseVerification& wide, std::size_t points) {
+  const double covered =
+      std::max(fine.evidence.source_overlap_any_normal, wide.evidence.source_overlap_any_normal);
+  PlaceEvidence out{surface_features(fine.evidence, covered), count(covered, points)};
+  at(out.features, PlaceFeature::search_log_odds) = logit(searched, kLeastSearch);
+  at(out.features, PlaceFeature::pair_log_odds) =
       logit(std::max(fine.confidence, wide.confidence), kLeastPair);
-  at(out, PlaceFeature::log_match_inliers) = portable::log1p(fine.evidence.match_inliers);
+  at(out.features, PlaceFeature::log_match_inliers) = portable::log1p(fine.evidence.match_inliers);
   return out;
 }
 
 double confidence_of_surfaces(const PoseVerification& place) {
   constexpr double kUndecided = 0.5;
-  return portable::logistic(log_odds(kPlanned.own, planned_features(kUndecided, place)));
+  return portable::logistic(
+      log_odds(kPlanned.own, planned_evidence(kUndecided, place, 0).features));
 }
 
-std::vector<double> place_confidences(const std::vector<PlaceFeatures>& places, bool planned,
+std::vector<double> place_confidences(const std::vector<PlaceEvidence>& places, bool planned,
                                       const std::function<bool(std::size_t, std::size_t)>& same) {
   const PlaceModel& model = planned ? kPlanned : kOfTiles;
   std::vector<double> own, out;
-  for (const PlaceFeatures& place : places)
-    own.push_back(std::max(kNoRival, log_odds(model.own, place)));
+  for (const PlaceEvidence& place : places)
+    own.push_back(std::max(kNoRival, log_odds(model.own, place.features)));
   for (std::size_t k = 0; k < places.size(); ++k) {
     double rival = kNoRival;
     for (std::size_t i = 0; i < places.size(); ++i)
       if (own[i] > rival && !same(k, i)) rival = own[i];
-    PlaceFeatures features = places[k];
+    PlaceFeatures features = places[k].features;
     at(features, PlaceFeature::lead) = std::clamp(own[k] - rival, -kMostLead, kMostLead);
-    out.push_back(portable::logistic(log_odds(model.among, features)));
+    // A scan beside the map contradicts nothing.
+    out.push_back(portable::logistic(log_odds(model.among, features)) *
+                  confidence::factor_of(places[k].covered));
   }
   return out;
 }

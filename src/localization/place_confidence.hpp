@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "confidence/confidence.hpp"
 #include "gpureg/verification.hpp"
 
 /// Whether a scan is at a place of a map: two regressions (place_confidence_model.hpp), for places
@@ -35,15 +36,22 @@ enum class PlaceFeature : std::uint8_t {
 constexpr std::size_t kPlaceFeatures = static_cast<std::size_t>(PlaceFeature::count);
 using PlaceFeatures = std::array<double, kPlaceFeatures>;
 
-/// Of a place that the plan of the map proposes, without the lead.
-/// @param searched confidence of the search.
-PlaceFeatures planned_features(double searched, const PoseVerification& place);
+/// What tells whether a scan is at a place.
+struct PlaceEvidence {
+  PlaceFeatures features{};            ///< without the lead
+  confidence::OverlapCount covered{};  ///< points of the scan that lie on the map
+};
 
-/// Of a place that a tile proposes, without the lead.
+/// Of a place that the plan of the map proposes.
+/// @param searched confidence of the search.
+/// @param points of the scan.
+PlaceEvidence planned_evidence(double searched, const PoseVerification& place, std::size_t points);
+
+/// Of a place that a tile proposes.
 /// @param wide the same place in voxels of the search, or a verification without any: sparse scans
 ///   are contained in wide voxels at least.
-PlaceFeatures tile_features(double searched, const PoseVerification& fine,
-                            const PoseVerification& wide);
+PlaceEvidence tile_evidence(double searched, const PoseVerification& fine,
+                            const PoseVerification& wide, std::size_t points);
 
 /// By the surfaces of a place alone, whatever proposed it.
 double confidence_of_surfaces(const PoseVerification& place);
@@ -51,7 +59,7 @@ double confidence_of_surfaces(const PoseVerification& place);
 /// Probability that the scan is at each place rather than nowhere, other places aside but for the
 /// lead over them.
 /// @param same whether two places, by index, are one: no rivals.
-std::vector<double> place_confidences(const std::vector<PlaceFeatures>& places, bool planned,
+std::vector<double> place_confidences(const std::vector<PlaceEvidence>& places, bool planned,
                                       const std::function<bool(std::size_t, std::size_t)>& same);
 
 }  // namespace gpureg::localization

@@ -16,10 +16,10 @@ namespace {
 /// Sets the confidences of the places of a scan.
 void judge(const Scan& scan, const EvidenceOptions& options, bool planned,
            std::vector<Verified>& places) {
-  std::vector<PlaceFeatures> features;
-  for (const Verified& v : places) features.push_back(v.features);
+  std::vector<PlaceEvidence> evidence;
+  for (const Verified& v : places) evidence.push_back(v.evidence);
   const std::vector<double> confidences =
-      place_confidences(features, planned, [&](std::size_t a, std::size_t b) {
+      place_confidences(evidence, planned, [&](std::size_t a, std::size_t b) {
         return same_place(places[a].verification.target_from_source,
                           places[b].verification.target_from_source, scan.middle, options);
       });
@@ -129,7 +129,8 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
         *std::max_element(results[k].begin(), results[k].end(),
                           [](const auto& a, const auto& b) { return a.confidence < b.confidence; });
     out[begin[k].scan].push_back(
-        {candidate, pose, clouds[k].size(), planned_features(candidate.confidence, pose), 0});
+        {candidate, pose, clouds[k].size(),
+         planned_evidence(candidate.confidence, pose, scans[begin[k].scan]->points.size()), 0});
   }
 }
 
@@ -172,7 +173,8 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
   const auto coarse = verify_coarsely(context, map, options, scan, fine, around);
   for (std::size_t k = 0; k < results.size(); ++k) {
     Verified& v = out[open[k]];
-    v.features = tile_features(v.candidate.confidence, v.verification, coarse[k]);
+    v.evidence =
+        tile_evidence(v.candidate.confidence, v.verification, coarse[k], scan.points.size());
   }
   judge(scan, options.registration.evidence, false, out);
   return out;

@@ -17,7 +17,7 @@ struct Verified {
   Candidate candidate;
   PoseVerification verification;
   std::size_t points = 0;  ///< of the neighbourhood
-  PlaceFeatures features{};
+  PlaceEvidence evidence;
   double confidence = 0;  ///< other places aside
 };
 

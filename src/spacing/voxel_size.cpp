@@ -44,6 +44,10 @@ constexpr double kGrowth = 1.1;
 constexpr std::size_t kFewestPoints = 1000;
 /// With what the voxels of prepare() lie differently, and rounding.
 constexpr std::size_t kFewestOfEach = 1100;
+/// Of the smaller one of two clouds, where the other one keeps so many times more: in voxels of
+/// metres, a sweep fits a model or map of a street in many places.
+constexpr std::size_t kFewestOfSmaller = 3300;
+constexpr double kLarger = 3;
 /// Points of the median cloud up to which a smaller one may drive the size, for its own sake.
 constexpr std::size_t kMostOfPair = 100'000, kMostOfSet = 20'000;
 // Neighbourhoods of the features, in voxels, and their points (harmonic mean, so that each has the
@@ -340,8 +344,17 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
     size *= kGrowth;
   size = rounded(size);
   const std::size_t most = views.size() > 2 ? kMostOfSet : kMostOfPair;
+  const auto smaller = [&] {
+    std::size_t least = std::numeric_limits<std::size_t>::max();
+    for (const SortedCloud& cloud : clouds)
+      least = std::min(least, cloud.occupied(size, sample, keys));
+    return static_cast<double>(least);
+  };
+  const std::size_t fewest =
+      views.size() == 2 && points(size) > kLarger * smaller() ? kFewestOfSmaller : kFewestOfEach;
   const auto keeps_enough = [&](const SortedCloud& cloud, double s) {
-    return cloud.occupied(s, sample, keys) >= kFewestOfEach;
+    return cloud.occupied(s, sample, keys) >=
+           std::min(fewest, std::max(kFewestOfEach, cloud.size() / 2));
   };
   double least = 0;  // found where a cloud needs it
   for (const SortedCloud& cloud : clouds) {

@@ -114,6 +114,11 @@ TEST(VoxelSize, LeavesAThousandPointsOfAPartOnAScene) {
   EXPECT_LT(pair, alone);
   EXPECT_GE(prepared_points(part, pair), 1000u);
   EXPECT_EQ(suggest({scene, part}).voxel_size, pair);
+  // A larger part, which voxels of the scene would leave a thousand points of, keeps more.
+  Points larger;
+  for (const Eigen::Vector3f& p : scene)
+    if ((p - scene.front()).norm() < 2.5f) larger.push_back(p);
+  EXPECT_GE(prepared_points(larger, suggest({larger, scene}).voxel_size), 3000u);
   // One part among many scenes does not make all of them slow.
   const float set = suggest({scene, scene, scene, part}).voxel_size;
   EXPECT_LE(prepared_points(scene, set), 25000u);

@@ -58,11 +58,16 @@ TEST(Features, OnlyOfAvailableEvidence) {
   EXPECT_EQ(value(none, Feature::log_lower_overlap), std::log(0.4));
 }
 
-// Of a scan on a model, containment and the rank tell alone.
+// Of a scan on a model tell containment, what the scan saw through, and the rank.
 TEST(Features, ContainmentInModels) {
   const Features x = features_of(some_evidence(), {true, true, true}, Regressand::confidence);
   EXPECT_EQ(value(x, Feature::log_uncovered), std::log(1 - 0.55));
-  EXPECT_EQ(std::count(x.begin(), x.end(), 0.0), static_cast<std::ptrdiff_t>(kFeatureCount - 1));
+  EXPECT_EQ(value(x, Feature::log_higher_violation), std::log(0.02));
+  EXPECT_EQ(value(x, Feature::log_higher_weighted_overlap), std::log(0.4));
+  EXPECT_EQ(std::count(x.begin(), x.end(), 0.0), static_cast<std::ptrdiff_t>(kFeatureCount - 3));
+  PoseEvidence clean = some_evidence();  // how clean a scan is tells nothing
+  clean.source_normal_weighted_overlap = 0.8;
+  EXPECT_EQ(features_of(clean, {true, true, true}, Regressand::confidence), x);
   const Features rank = features_of(some_evidence(), {true, true, true}, Regressand::ranking);
   EXPECT_EQ(value(rank, Feature::log_higher_weighted_overlap), std::log(0.4));
   EXPECT_EQ(std::count(rank.begin(), rank.end(), 0.0),
@@ -163,6 +168,7 @@ TEST(Confidence, OfTheGeneratedModel) {
   worse.match_inliers = 5;
   worse.source_front_violation_near = 0.1;
   worse.source_normal_weighted_overlap = 0.3;
+  worse.source_overlap_any_normal = 0.5;
   constexpr std::uint32_t kRefined = 16;
   const OverlapCount overlap{90, 2000};
   const auto probability = [](double odds) { return 1 / (1 + std::exp(-odds)); };

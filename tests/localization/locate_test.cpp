@@ -34,6 +34,22 @@ TEST(Locate, FindsAScanInItsRoomAndSaysWhereItIsNot) {
   EXPECT_GT(nowhere.absent_probability, 0.5);
 }
 
+// Compared with the other sides of its surfaces, a map supports no place.
+TEST(Locate, AMapWithoutSidesIsComparedByThoseThatItInfers) {
+  PointCloud cloud;
+  for (const unsigned room : {1u, 2u, 3u})
+    for (const Eigen::Vector3f& p : moved(map_from_room(room - 1), furnished_room(room, room)))
+      cloud.points.push_back(p);
+  const PreparedMap map = localization::prepare_map(cloud.view(), map_options());
+  for (const unsigned room : {1u, 2u, 3u}) {
+    const Query query(room, room - 1, room + 7);
+    const LocateResult result = locate(context(), query.scan.view(), map);
+    ASSERT_EQ(result.status, LocateStatus::found);
+    const PoseEvidence& e = result.poses.front().verification.evidence;
+    EXPECT_GT(e.source_overlap, 0.7 * e.source_overlap_any_normal);
+  }
+}
+
 TEST(Locate, WhatTheMapLacksCostsConfidence) {
   const PreparedMap map = building({1, 2, 3}, map_options());
   Query query(2, 1, 2);

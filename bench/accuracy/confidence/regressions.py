@@ -199,6 +199,38 @@ def monotone(x, y, weight, names=None, signs=SIGNS, steps_at=None):
     return Regression(np.zeros(x.shape[1]), float(bias), kept)
 
 
+# The same of the linear regressions for models.
+MODEL_SIGNS = {
+    "log_uncovered": -1,
+    "log_higher_violation": -1,
+    "log_higher_weighted_overlap": 1,
+    "log_odds": 1,
+    "margin": 1,
+    "distinct_share": -1,
+}
+
+
+def signed_logistic(x, y, weight, strength):
+    """As logistic(), for models: no weight has another sign than MODEL_SIGNS."""
+    names = library()._confidence_feature_names()
+    used = np.array([k for k, name in enumerate(names) if name in MODEL_SIGNS and x[:, k].any()])
+    mean, scale = x[:, used].mean(0), np.maximum(x[:, used].std(0), MIN_SCALE)
+    z = np.c_[(x[:, used] - mean) / scale, np.ones(len(x))]
+
+    def objective(b):
+        odds = z @ b
+        residual = weight * (1 / (1 + np.exp(-odds)) - y)
+        loss = weight @ np.logaddexp(0, np.where(y, -odds, odds))
+        plain = np.r_[b[:-1], 0]
+        return strength * loss + plain @ b / 2, strength * (z.T @ residual) + plain
+
+    bounds = [(0, None) if MODEL_SIGNS[names[k]] > 0 else (None, 0) for k in used]
+    b = minimised(objective, np.zeros(len(used) + 1), [*bounds, (None, None)])
+    weights = np.zeros(x.shape[1])
+    weights[used] = b[:-1] / scale
+    return Regression(weights, float(b[-1] - weights[used] @ mean))
+
+
 def logistic(x, y, weight, strength):
     """Logistic regression on standardised features, written as weights of the features themselves.
 
