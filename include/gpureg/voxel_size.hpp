@@ -47,9 +47,9 @@ struct VoxelSizeSuggestion {
 /// a LiDAR, until they have an area. 1,000 points remain, of every cloud that has as many (a part
 /// on a scene), and 3,000 of the smaller one of two, where the other one keeps three times as many
 /// (a sweep in a model), as far as the median cloud then keeps at most 100,000 (two clouds) or
-/// 20,000 (more). Scans of 2-D scanners keep about 300 points, in layers. Rounded to one or two digits.
-/// Reads at most 16 clouds, evenly chosen, and samples of their points; non-finite and repeated
-/// points do not matter. Deterministic, thread-safe.
+/// 20,000 (more). Scans of 2-D scanners keep about 300 points, in layers. Rounded to one or two
+/// digits. Reads at most 16 clouds, evenly chosen, and samples of their points; non-finite and
+/// repeated points do not matter. Deterministic, thread-safe.
 /// @param views host memory, all in one unit.
 /// @return the suggestion, or the reason why the data allows none.
 /// @throws InvalidArgument as PointCloudView::validate().
