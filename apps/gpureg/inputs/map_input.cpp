@@ -88,8 +88,6 @@ PreparedMap map_of_scans(const Context& context, const ScanInput& input,
 
 }  // namespace
 
-ScanInput scans_of_reconstruction(const std::string& file) { return read_saved_map(file).scans; }
-
 bool has_poses(const ScanInput& input) {
   std::error_code ignored;
   const fs::path folder = input.folder();

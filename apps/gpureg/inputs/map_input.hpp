@@ -36,11 +36,6 @@ struct MapInput {
                                     const localization::MapOptions& options) const;
 };
 
-/// The scans of a reconstruction.json, which names them from where `reconstruct` ran, or those of
-/// that name beside the output of `reconstruct`.
-/// @throws IoError naming the file: damaged, or neither is there.
-ScanInput scans_of_reconstruction(const std::string& file);
-
 /// Whether there are poses of the scans of a folder: a reconstruction.json, poses.txt or
 /// trajectory.txt.
 bool has_poses(const ScanInput& input);

@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "gpureg/error.hpp"
-#include "inputs/map_poses.hpp"
 #include "json/json.hpp"
 #include "json/json_fields.hpp"
 #include "json/json_file.hpp"
@@ -76,29 +75,6 @@ SavedMap read_saved_map(const std::string& file) {
     if (beside.exists()) map.scans = beside;
   }
   return map;
-}
-
-reconstruction::Reconstruction read_map_poses(const std::string& path,
-                                              const std::vector<io::ScanFile>& scans,
-                                              const std::string& folder) {
-  const std::string file = saved_map_file(path);
-  if (file.empty()) {
-    if (std::error_code ignored; fs::is_directory(path, ignored))
-      throw IoError(path + " has no reconstruction.json" + kWrittenLast);
-    return read_pose_file(path, scans, folder);
-  }
-  const SavedMap saved = read_saved_map(file);
-  std::map<int, std::uint32_t> saved_island;
-  for (std::uint32_t k = 0; k < saved.islands.size(); ++k)
-    for (const int number : saved.islands[k]) saved_island[number] = k;
-  PosesByNumber poses;
-  std::map<std::int64_t, std::uint32_t> island;
-  for (const io::ScanFile& scan : scans)
-    if (const auto number = saved.number_of(scan)) {
-      poses[scan.number] = saved.poses.at(*number);
-      island[scan.number] = saved_island.at(*number);
-    }
-  return map_of(poses, island, scans, file, folder);
 }
 
 }  // namespace gpureg::cli

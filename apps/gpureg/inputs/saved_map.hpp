@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "gpureg/reconstruction/map.hpp"
+#include "gpureg/result.hpp"
 #include "inputs/scan_input.hpp"
 
 namespace gpureg::cli {
@@ -34,12 +34,5 @@ std::string saved_map_file(const std::string& path);
 /// @param file reconstruction.json
 /// @throws IoError naming the file and what is wrong.
 SavedMap read_saved_map(const std::string& file);
-
-/// The map of the folder of a finished `gpureg reconstruct` or of its reconstruction.json, with its
-/// islands; or that of read_pose_file(), whose parameters these are.
-/// @throws IoError as read_pose_file(), also for a folder of an unfinished `gpureg reconstruct`.
-reconstruction::Reconstruction read_map_poses(const std::string& path,
-                                              const std::vector<io::ScanFile>& scans,
-                                              const std::string& folder);
 
 }  // namespace gpureg::cli

@@ -12,8 +12,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
-#include "inputs/map_input.hpp"
-#include "inputs/scan_input.hpp"
+#include "inputs/saved_map.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -96,7 +95,7 @@ std::vector<NamedPath> files_of(const NamedPath& input) {
   if (!is_folder)
     add_folder(input.name, path.parent_path().empty() ? "." : path.parent_path(), files);
   try {
-    add_folder(input.name, scans_of_reconstruction(reconstruction.string()).folder(), files);
+    add_folder(input.name, read_saved_map(reconstruction.string()).scans.folder(), files);
   } catch (const Error&) {  // whoever reads it says what is wrong with it
   }
   return files;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <sstream>
 
@@ -12,6 +13,7 @@
 #include "gpureg/evaluation/trajectory.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/reconstruction/mend.hpp"
+#include "inputs/map_poses.hpp"
 #include "inputs/saved_map.hpp"
 #include "inputs/scene.hpp"
 #include "json/json_file.hpp"
@@ -51,6 +53,32 @@ const char* explained(AuditVerdict verdict) {
   }
   return "undecided: most scans do not see each other; are they poses of these scans, in the unit "
          "of their points?";
+}
+
+/// The map of the folder of a finished `gpureg reconstruct` or of its reconstruction.json, with its
+/// islands; or that of read_pose_file(), whose parameters these are.
+/// @throws IoError as read_pose_file(), also for a folder of an unfinished `gpureg reconstruct`.
+reconstruction::Reconstruction read_map_poses(const std::string& path,
+                                              const std::vector<io::ScanFile>& scans,
+                                              const std::string& folder) {
+  const std::string file = saved_map_file(path);
+  if (file.empty()) {
+    if (std::error_code ignored; std::filesystem::is_directory(path, ignored))
+      throw IoError(path + " has no reconstruction.json" + kWrittenLast);
+    return read_pose_file(path, scans, folder);
+  }
+  const SavedMap saved = read_saved_map(file);
+  std::map<int, std::uint32_t> saved_island;
+  for (std::uint32_t k = 0; k < saved.islands.size(); ++k)
+    for (const int number : saved.islands[k]) saved_island[number] = k;
+  PosesByNumber poses;
+  std::map<std::int64_t, std::uint32_t> island;
+  for (const io::ScanFile& scan : scans)
+    if (const auto number = saved.number_of(scan)) {
+      poses[scan.number] = saved.poses.at(*number);
+      island[scan.number] = saved_island.at(*number);
+    }
+  return map_of(poses, island, scans, file, folder);
 }
 
 /// What a person reads first.
