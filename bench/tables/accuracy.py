@@ -207,16 +207,6 @@ def front():
     ]
 
 
-def accuracy_attempts():
-    record = load("accuracy_attempts.json")
-    scenes = list(record["before"])
-    rows = ["| tried | " + " | ".join(scenes) + " | |", "| --- |" + " --- |" * (len(scenes) + 1)]
-    for entry in [{"tried": "(nothing)", **record["before"]}, *record["attempts"]]:
-        cells = [f"{entry[s][0]:.1f} / {entry[s][1]:.1f}" if s in entry else "" for s in scenes]
-        rows.append(f"| {entry['tried']} | {' | '.join(cells)} | {entry.get('remark', '')} |")
-    return rows
-
-
 SENSORS = {
     "kitchen": "rooms: red kitchen, depth camera",
     "dragon": "objects: Stanford dragon, range scanner",
@@ -458,5 +448,4 @@ TABLES = {
     "closing_loops": closing_loops,
     "few_points": few_points,
     "front": front,
-    "accuracy_attempts": accuracy_attempts,
 }

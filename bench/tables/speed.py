@@ -185,25 +185,6 @@ def large_maps():
     ]
 
 
-def survivors():
-    record = load("survivors.json")
-    rows = {}
-    for row in record["rows"]:
-        rows.setdefault((row["scene"], row["max_survivors"]), []).append(row)
-    cell = lambda runs, key: " / ".join(f"{run[key]:.1f}" for run in runs)  # noqa: E731
-    return [
-        "| scene | `max_survivors` | recall, % | precision, % | recall of the candidates, % | R@P95, % | ms per pair |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-        *[
-            f"| {scene} | {most:,} | {cell(runs, 'recall')} | {cell(runs, 'precision')} | {cell(runs, 'recall_of_candidates')} |"
-            f" {cell(runs, 'recall_at_95')} | {runs[0]['ms_per_pair']:.3f} |"
-            for (scene, most), runs in rows.items()
-        ],
-        "",
-        f"Seeds 1, 2 and 3 at commit {record['commit']} on an {record['gpu']}, all pairs of a scene in one batch, strict rule.",
-    ]
-
-
 def devices():
     context, runs = benchmarks("pipeline_two_devices.json")
     one = runs["redwood_sized/cuda"]
@@ -324,7 +305,6 @@ TABLES = {
     "pipeline_steps": pipeline_steps,
     "devices": devices,
     "threads": threads,
-    "survivors": survivors,
     "large_maps": large_maps,
     "scaling": scaling,
     "pair_by_default": pair_by_default,
