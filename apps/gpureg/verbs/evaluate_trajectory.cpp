@@ -30,8 +30,8 @@ const std::map<std::string, TrajectoryFormat> kFormats = {{"auto", TrajectoryFor
                                                           {"tum", TrajectoryFormat::tum},
                                                           {"kitti", TrajectoryFormat::kitti},
                                                           {"poses", TrajectoryFormat::blocks}};
-const std::map<std::string, DeltaUnit> kUnits = {{"frames", DeltaUnit::frames},
-                                                 {"metres", DeltaUnit::metres}};
+const std::map<std::string, DeltaUnit> kDeltaUnits = {{"frames", DeltaUnit::frames},
+                                                      {"metres", DeltaUnit::metres}};
 
 Json statistics_json(const ErrorStatistics& s) {
   if (s.count == 0) return nullptr;
@@ -116,7 +116,7 @@ void add_evaluate_trajectory(CommandLine& line) {
   verb.option("--delta", o->options.delta, "Step of the relative error, in --delta-unit")
       .show_default()
       .positive();
-  verb.choice("--delta-unit", o->options.delta_unit, kUnits,
+  verb.choice("--delta-unit", o->options.delta_unit, kDeltaUnits,
               "frames: every pose and the one so many later; metres: consecutive steps of at "
               "least that length")
       .show_default("frames")

@@ -243,9 +243,9 @@ class Reader {
   }
 
   void look_for_poses(std::string_view line) {
-    constexpr std::size_t kMost = 17;  // one more than a matrix has
+    constexpr std::size_t kFields = 17;  // one more than a matrix has
     Fields fields;
-    cut(line, *separator_, kMost, fields);
+    cut(line, *separator_, kFields, fields);
     std::vector<double>& row = first_rows_.emplace_back();
     for (const std::string_view field : fields) {
       double number = std::numeric_limits<double>::quiet_NaN();
