@@ -38,12 +38,6 @@ class Determinism : public ::testing::Test {
   std::vector<Pair> pairs;
 };
 
-TEST_F(Determinism, SameBytesOnOneTwoAndSevenThreads) {
-  const auto one = run(Context::cpu(1), pairs);
-  EXPECT_EQ(run(Context::cpu(2), pairs), one);
-  EXPECT_EQ(run(Context::cpu(7), pairs), one);
-}
-
 TEST_F(Determinism, SameBytesInAnyOrderAndAnySplit) {
   const Context context = Context::cpu(2);
   const auto expected = run(context, pairs);

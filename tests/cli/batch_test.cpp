@@ -125,18 +125,6 @@ TEST_F(Batch, JsonHasEveryFieldOfEveryPair) {
   EXPECT_EQ(reasons["too_few_source_points"], kScans + 1);
 }
 
-TEST_F(Batch, ThreadsChangeNoByte) {
-  ASSERT_EQ(batch("t1", {"--threads", "1"}).status, 0);
-  for (const std::string threads : {"2", "7"}) {
-    const std::string name = "t" + threads;
-    ASSERT_EQ(batch(name, {"--threads", threads}).status, 0);
-    EXPECT_EQ(content_of(out_ / (name + ".log")), content_of(out_ / "t1.log"));
-    EXPECT_EQ(content_of(out_ / (name + ".info")), content_of(out_ / "t1.info"));
-    EXPECT_EQ(without_times(json_of(out_ / (name + ".json"))).dump(),
-              without_times(json_of(out_ / "t1.json")).dump());
-  }
-}
-
 TEST_F(Batch, PairsOfAFile) {
   const std::string pairs = out_.write("pairs.txt", "# i j\n3 1\n0 2\n1 3\n0 5\n");
   const Outcome outcome = batch("some", {"--pairs", pairs});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fstream>
 
+#include "files/envelope.hpp"
 #include "fuzz/targets.hpp"
 #include "gpureg/evaluation/trajectory.hpp"
 #include "gpureg/pose_graph/files.hpp"
@@ -82,10 +83,9 @@ void read_kitti(std::string_view bytes) {
 
 /// The input is what follows the header: no mutation finds a checksum.
 std::string with_header(std::string_view payload) {
-  std::uint64_t sum = 14695981039346656037ull;  // FNV-1a
-  for (const char c : payload) sum = (sum ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return "gpuregLC" + test::raw(std::uint32_t{2}) + test::raw(std::uint64_t{payload.size()}) +
-         test::raw(sum) + std::string(payload);
+  files::Envelope envelope;
+  envelope.add(payload);
+  return envelope.header({"gpuregLC", 2, ""}) + std::string(payload);
 }
 
 void read_saved_state(std::string_view bytes) {

@@ -6,6 +6,7 @@
 
 #include "fields/audit.hpp"
 #include "fields/localization.hpp"
+#include "files/envelope.hpp"
 #include "fuzz/inputs.hpp"
 #include "fuzz/targets.hpp"
 #include "gpureg/change.hpp"
@@ -133,11 +134,9 @@ void run_change(std::string_view input) {
 /// The input is what follows the header: no mutation finds a checksum. What is read can be saved,
 /// and scans can be compared with it and located in it.
 void read_saved_map(std::string_view payload) {
-  std::uint64_t sum = 14695981039346656037ull;  // FNV-1a
-  for (const char c : payload) sum = (sum ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  const std::string content = "gpuregMP" + test::raw(std::uint32_t{3}) +
-                              test::raw(std::uint64_t{payload.size()}) + test::raw(sum) +
-                              std::string(payload);
+  files::Envelope envelope;
+  envelope.add(payload);
+  const std::string content = envelope.header({"gpuregMP", 3, ""}) + std::string(payload);
   const test::MemoryFile file(content);
   if (!PreparedMap::is_saved(file.path())) broken("a saved map is known by its beginning");
   PreparedMap map;

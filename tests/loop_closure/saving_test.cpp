@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 
+#include "common/fnv1a.hpp"
 #include "loop_closure/drive.hpp"
 #include "support/expect_error.hpp"
 #include "support/limited_file_size.hpp"
@@ -89,10 +90,10 @@ TEST_F(Saving, DamagedFilesAreNamedAndTheStateStays) {
 /// A file whose checksum is right whatever its payload is.
 std::string with_checksum(std::string content) {
   constexpr std::size_t header = 28, place = 20;
-  std::uint64_t sum = 14695981039346656037ull;  // FNV-1a
-  for (std::size_t k = header; k < content.size(); ++k)
-    sum = (sum ^ static_cast<unsigned char>(content[k])) * 1099511628211ull;
-  std::memcpy(content.data() + place, &sum, sizeof sum);
+  Fnv1a sum;
+  sum.add_bytes(std::string_view(content).substr(header));
+  const std::uint64_t value = sum.value();
+  std::memcpy(content.data() + place, &value, sizeof value);
   return content;
 }
 

@@ -2,7 +2,8 @@
 // Prints the bytes of results of 20 generated pairs, one fact per line; with a file it compares
 // them with its lines. No test library, so that it builds for any processor.
 //   gpureg_golden [--cuda]         prints; --cuda: of the first device
-//   gpureg_golden [--cuda] FILE    compares; exits with 1 where a line differs
+//   gpureg_golden [--cuda] FILE [THREADS]    compares; exits with 1 where a line differs
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -124,9 +125,11 @@ int compare(const std::vector<std::string>& here, const std::string& path) {
 
 int main(int count, char** arguments) {
   const bool cuda = count > 1 && std::strcmp(arguments[1], "--cuda") == 0;
-  const gpureg::Report report =
-      gpureg::results_of(cuda ? gpureg::Context::cuda() : gpureg::Context::cpu(2));
   const int file = cuda ? 2 : 1;
+  const unsigned threads =
+      file + 1 < count ? static_cast<unsigned>(std::strtoul(arguments[file + 1], nullptr, 10)) : 2;
+  const gpureg::Report report =
+      gpureg::results_of(cuda ? gpureg::Context::cuda() : gpureg::Context::cpu(threads));
   if (file < count) return gpureg::compare(report.lines(), arguments[file]);
   for (const std::string& line : report.lines()) std::cout << line << "\n";
   return 0;

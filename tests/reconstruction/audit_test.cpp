@@ -369,21 +369,6 @@ TEST_F(AuditedRoom, AScanAtAWrongPlaceIsNamed) {
   }
 }
 
-TEST_F(AuditedRoom, ThreadsDoNotMatter) {
-  const std::vector<UnalignedIsometry3d> poses = with_slip(2, 0.5);
-  const Audit one = audited(poses);
-  const Audit four =
-      audit(Context::cpu(4), clouds, poses, options, AuditOptions::from_voxel_size(0.1f));
-  ASSERT_EQ(one.pairs.size(), four.pairs.size());
-  for (std::size_t k = 0; k < one.pairs.size(); ++k) {
-    EXPECT_EQ(one.pairs[k].log_likelihood_ratio, four.pairs[k].log_likelihood_ratio);
-    EXPECT_EQ(one.pairs[k].violation, four.pairs[k].violation);
-  }
-  ASSERT_EQ(one.connections.size(), four.connections.size());
-  for (std::size_t k = 0; k < one.connections.size(); ++k)
-    EXPECT_EQ(one.connections[k].confidence, four.connections[k].confidence);
-}
-
 TEST_F(AuditedRoom, ScansWithoutAPoseAreLeftOut) {
   std::vector<UnalignedIsometry3d> poses = world_from_scan;
   poses[4] = no_pose();

@@ -119,16 +119,6 @@ TEST(Reconstruct, FurtherModesConnectAScan) {
   EXPECT_EQ(map.edges.back().mode, 1u);
 }
 
-TEST(Reconstruct, SameBytesOnAnyNumberOfThreads) {
-  PairResults data(20);
-  data.add_chain(0, 20, 4);
-  data.add_false(19, 0, 0.9);
-  reconstruction::Options one, four;
-  one.threads = 1;
-  four.threads = 4;
-  EXPECT_EQ(bytes_of(data.map(one)), bytes_of(data.map(four)));
-}
-
 TEST(Reconstruct, NothingToPlace) {
   EXPECT_TRUE(PairResults(0).map().scans.empty());
   const auto map = PairResults(3).map();

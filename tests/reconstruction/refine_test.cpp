@@ -28,17 +28,6 @@ TEST(Refine, BringsAllScansTogether) {
   EXPECT_EQ(map.scans[0].island_from_scan.matrix(), Eigen::Matrix4d::Identity());
 }
 
-TEST(Refine, SameBytesOnAnyNumberOfThreads) {
-  const Rooms rooms;
-  auto one = rooms.data.map(), four = one;
-  RefineOptions options;
-  options.threads = 1;
-  reconstruction::refine(rooms.surfaces, one, options);
-  options.threads = 4;
-  reconstruction::refine(rooms.surfaces, four, options);
-  EXPECT_EQ(bytes_of(one), bytes_of(four));
-}
-
 TEST(Refine, WithoutPointsTheEdgesHold) {
   const Rooms rooms;
   auto map = rooms.data.map();

@@ -196,12 +196,6 @@ TEST_F(Evaluate, LogsHaveNoRanking) {
   EXPECT_EQ(json_of(out_ / "e.json")["scenes"][0]["strict"]["recall"], 0.25);
 }
 
-TEST_F(Evaluate, AnEmptyResultHasNoRecall) {
-  EXPECT_EQ(evaluate(write(json::array())).status, 0);
-  EXPECT_EQ(json_of(out_ / "e.json")["scenes"][0]["strict"]["recall"], 0.0);
-  EXPECT_EQ(evaluate(out_.write("r.log", "")).status, 0);
-}
-
 TEST_F(Evaluate, FilesThatAreNoResults) {
   expect_bad("{", {": parse error at line 1"});
   expect_bad("{\"pairs\": 3}", {"no array \"pairs\""});
@@ -247,32 +241,6 @@ TEST_F(Evaluate, LogsAndTruthsThatAreWrong) {
   expect_refused(against(result, truth_.path()), {"gt.info"});
 }
 
-// Nothing is dropped silently: every complaint names the file and the line (or the entry of a
-// JSON).
-TEST_F(Evaluate, MalformedLogsAreNamedWithTheirLine) {
-  const std::string unit = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
-  const auto expect_line = [&](const std::string& text, const std::string& line,
-                               const std::string& reason) {
-    const std::string path = out_.write("bad.log", text);
-    expect_refused({"evaluate", path, "--ground-truth", truth_.path()},
-                   {path + ":" + line + ":", reason});
-    const std::string good = truth_.write("r.log", "0 2 9\n" + unit);
-    const std::string as_truth = truth_.write("gt.log", text);
-    expect_refused({"evaluate", good, "--ground-truth", truth_.path()},
-                   {as_truth + ":" + line + ":", reason});
-  };
-  expect_line("0 2 9\n" + unit + "0 3 9\n1 0 0 0\n0 1 0 0\n", "8", "ends before row 3");
-  expect_line("0 2 9\n" + unit + "0 3\n" + unit, "6", "expected 3");
-  expect_line("0 2 9\n" + unit + "0 3 8\n" + unit, "6", "8 fragments, the first block says 9");
-  expect_line("0 2 9\n" + unit + "\n0 9 9\n" + unit, "7", "out of range");
-  expect_line("12 2 9\n" + unit, "1", "out of range");
-  expect_line("2 2 9\n" + unit, "1", "itself");
-  expect_line("0 2 9\n" + unit + "0 3 9\n" + unit + "0 2 9\n" + unit, "11",
-              "stands twice, first in line 1");
-  expect_line("0 2 9\n" + unit + "0 3 9\n1 0 0 0\n0 1 0 0\n0 0 2 0\n0 0 0 1\n", "10", "rotation");
-  expect_line("0 2 9\n" + unit + "0 3 9\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n", "10", "last row");
-}
-
 TEST_F(Evaluate, ResultsOfAnotherScene) {
   const auto against = [&](const std::string& path) {
     return std::vector<std::string>{"evaluate", path, "--ground-truth", truth_.path()};
@@ -287,16 +255,6 @@ TEST_F(Evaluate, ResultsOfAnotherScene) {
   json missing = {{"fragments", {{{"number", 0}}, {{"number", 2}}}},
                   {"pairs", {pair(0, 2, 0.9, true, false), pair(0, 3, 0.9, true, false)}}};
   expect_bad(missing.dump(), {"pairs[1]", "fragment 3", "lacks"});
-}
-
-TEST_F(Evaluate, InformationThatContradictsItsLogIsNamedWithItsLine) {
-  const std::string result = out_ / "r.log";
-  evaluation::write_log(result, {{0, 2, 9, Eigen::Matrix4d::Identity()}});
-  auto information = evaluation::read_information(truth_ / "gt.info");
-  std::swap(information[1], information[2]);
-  evaluation::write_information(truth_ / "gt.info", information);
-  expect_refused({"evaluate", result, "--ground-truth", truth_.path()},
-                 {"gt.info:8:", "pair 0 4", "pair 0 3"});
 }
 
 }  // namespace
