@@ -20,6 +20,15 @@
 #include "loop_closure/verify.hpp"
 
 namespace gpureg::loop_closure {
+
+/// What hosts see between two calls of process().
+struct Published {
+  std::shared_ptr<const std::vector<FragmentPose>> poses =
+      std::make_shared<const std::vector<FragmentPose>>();
+  std::shared_ptr<const std::vector<Loop>> loops = std::make_shared<const std::vector<Loop>>();
+  std::shared_ptr<const pose_graph::Graph> graph = std::make_shared<const pose_graph::Graph>();
+};
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -64,14 +73,6 @@ void make_room(std::vector<T>& list, std::size_t more) {
   if (list.capacity() - list.size() < more)
     list.reserve(std::max(list.size() + more, 2 * list.size()));
 }
-
-/// What hosts see between two calls of process().
-struct Published {
-  std::shared_ptr<const std::vector<FragmentPose>> poses =
-      std::make_shared<const std::vector<FragmentPose>>();
-  std::shared_ptr<const std::vector<Loop>> loops = std::make_shared<const std::vector<Loop>>();
-  std::shared_ptr<const pose_graph::Graph> graph = std::make_shared<const pose_graph::Graph>();
-};
 
 Published published(const State& state, const Options& options) {
   std::vector<Loop> loops;
