@@ -16,9 +16,9 @@ constexpr double kOffsetDeviation = 1.5, kSlopeDeviation = 0.5;
 /// Log odds of a sample, at most so far from even: the odds of hopeless poses go down to 10^-30,
 /// and one of them would decide the slope.
 constexpr double kMostLogOdds = 7.0;
-constexpr int kIterations = 100, kHalvings = 20;
+constexpr int kNewtonSteps = 100, kHalvings = 20;
 constexpr double kConverged = 1e-9;
-constexpr std::size_t kBins = 10;
+constexpr std::size_t kErrorBins = 10;
 
 double log_odds_of(double confidence) {
   if (confidence <= 0) return -kMostLogOdds;
@@ -85,7 +85,7 @@ Posterior posterior_at(const std::vector<Point>& points, double offset, double s
 /// Newton's method with halved steps; the posterior is strictly convex. fixed_slope: at a bound.
 ConfidenceCalibration minimum(const std::vector<Point>& points, const double* fixed_slope) {
   double offset = 0, slope = fixed_slope ? *fixed_slope : 1.0;
-  for (int k = 0; k < kIterations; ++k) {
+  for (int k = 0; k < kNewtonSteps; ++k) {
     const Posterior p = posterior_at(points, offset, slope);
     double step[2];
     if (fixed_slope) {
@@ -148,17 +148,17 @@ CalibrationFit fit_calibration(const std::vector<CalibrationSample>& samples) {
 double calibration_error(const std::vector<CalibrationSample>& samples,
                          const ConfidenceCalibration& calibration) {
   check(samples);
-  double weight[kBins] = {}, confidence[kBins] = {}, correct[kBins] = {}, sum = 0;
+  double weight[kErrorBins] = {}, confidence[kErrorBins] = {}, correct[kErrorBins] = {}, sum = 0;
   for (const CalibrationSample& sample : samples) {
     const double c = calibration(sample.confidence);
-    const std::size_t bin = std::min(kBins - 1, static_cast<std::size_t>(c * kBins));
+    const std::size_t bin = std::min(kErrorBins - 1, static_cast<std::size_t>(c * kErrorBins));
     weight[bin] += sample.weight;
     confidence[bin] += sample.weight * c;
     correct[bin] += sample.correct ? sample.weight : 0.0;
     sum += sample.weight;
   }
   double error = 0;
-  for (std::size_t k = 0; k < kBins; ++k) error += std::abs(confidence[k] - correct[k]);
+  for (std::size_t k = 0; k < kErrorBins; ++k) error += std::abs(confidence[k] - correct[k]);
   return sum > 0 ? error / sum : 0;
 }
 

@@ -14,7 +14,7 @@ namespace {
 /// correct are, and 113 of the 114 false ones.
 constexpr double kSure = 0.98;
 
-double odds(double probability) { return probability / std::max(1.0 - probability, 1e-12); }
+double odds_of(double probability) { return probability / std::max(1.0 - probability, 1e-12); }
 
 }  // namespace
 
@@ -55,10 +55,10 @@ std::vector<std::optional<bool>> verdicts_of_loops(const std::vector<Pair>& pair
     // The verdict must come from the other pairs alone, as the confidence of this one is what is
     // calibrated: loops decide from even odds.
     const double own = pair.mode == 0 ? results[p].score : results[p].modes[pair.mode].confidence;
-    const double factor = odds(pair.confidence) / odds(std::max(own, 1e-12));
+    const double factor = odds_of(pair.confidence) / odds_of(std::max(own, 1e-12));
     const bool is_first = pair.mode == 0 || results[p].modes[pair.mode].equivalent;
-    if (factor >= odds(kSure)) out[p] = is_first;
-    if (factor <= odds(1.0 - kSure) && pair.mode == 0) out[p] = false;
+    if (factor >= odds_of(kSure)) out[p] = is_first;
+    if (factor <= odds_of(1.0 - kSure) && pair.mode == 0) out[p] = false;
   }
   return out;
 }

@@ -16,7 +16,7 @@ namespace {
 /// Loops that the estimate takes, evenly spread over all.
 constexpr std::size_t kMostLoops = 256;
 /// Rounds of the maximisation at most, and the relative change of the variances that ends it.
-constexpr int kMostRounds = 50;
+constexpr int kMostNoiseRounds = 50;
 constexpr double kConverged = 0.01;
 /// The stated noise is right within this factor, by one standard deviation of its logarithm.
 /// Results hardly depend on it (bench/notes/loops.md).
@@ -83,7 +83,7 @@ double most_likely_log(double expected, double shown, double most) {
 /// Factors on the stated variances that make the misclosures most likely.
 std::array<double, kComponents> most_likely(const std::vector<Misclosure>& data) {
   std::array<double, kComponents> factors{1, 1, 1, 1};
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostNoiseRounds; ++round) {
     std::array<double, kComponents> shown{}, expected{};
     for (const Misclosure& m : data) {
       Matrix6d covariance = m.fixed;

@@ -13,7 +13,7 @@ namespace {
 
 /// Of the feature radius: the largest difference of distances between compatible matches, and the
 /// smallest distance. Key points are 0.6 radii apart, so those of one place differ by as much.
-constexpr float kTolerance = 0.6f, kShortest = 0.8f;
+constexpr float kTolerance = 0.6f, kLeastLength = 0.8f;
 /// Largest difference of cosines between compatible matches.
 constexpr float kMaxTurn = 0.3f;
 /// A key is the product of two features and the place of a key point counted from the end: below
@@ -53,7 +53,7 @@ struct Segment {
 
 bool are_compatible(const Segment& a, const Segment& b, float radius) {
   if (std::abs(a.length - b.length) > kTolerance * radius ||
-      !(std::min(a.length, b.length) >= kShortest * radius))
+      !(std::min(a.length, b.length) >= kLeastLength * radius))
     return false;
   const std::array<float, 3> x = a.cosines(), y = b.cosines();
   return std::abs(x[0] - y[0]) <= kMaxTurn && std::abs(x[1] - y[1]) <= kMaxTurn &&

@@ -139,8 +139,8 @@ def full_folders(root: pathlib.Path) -> list[str]:
 TOGETHER = (
     ("src/cpu",),
     tuple(f"src/{name}" for name in ("api viewpoint flat symmetry spacing sensor_fixed confidence calibration"
-                                     " loop_consistency pruning").split()),
-    *((f"src/{name}",) for name in "evaluation io pose_graph reconstruction localization fields files".split()),
+                                     " loop_consistency pruning scale").split()),
+    *((f"src/{name}",) for name in "evaluation io sets pose_graph reconstruction loop_closure localization fields files".split()),
     ("data",),
     tuple(f"apps/gpureg/{name}" for name in "verbs options run inputs json records pages pictures".split()),
 )  # fmt: skip
