@@ -11,6 +11,7 @@
 #include "api/name_cloud.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
+#include "api/prepare_copies.hpp"
 #include "api/raw_cloud.hpp"
 #include "api/variants.hpp"
 #include "common/host_threads.hpp"
@@ -85,12 +86,12 @@ std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
   return owners;
 }
 
-}  // namespace
-
-std::vector<PreparedCloud> prepare_batch(const Context& context,
-                                         const std::vector<PointCloudView>& clouds,
-                                         const PrepareOptions& options,
-                                         const std::vector<std::string>& names) {
+/// @param scales of copies of one cloud that are for matches alone, or none.
+std::vector<PreparedCloud> prepare_all(const Context& context,
+                                       const std::vector<PointCloudView>& clouds,
+                                       const PrepareOptions& options,
+                                       const std::vector<std::string>& names,
+                                       const std::vector<double>& scales) {
   options.validate();
   check_names(names, clouds.size());
   const auto naming = [&](std::size_t k, auto&& action) {
@@ -106,13 +107,14 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
       Access::engine(context)->check_on_host(cloud);
       return cloud;
     }));
+    raw.back().matched_only = !scales.empty();
     knowledge.push_back(knowledge_of(clouds[k]));
     view_from_frame_origin(clouds[k].origin, frame_origins[k], raw.back());
   }
   std::vector<PreparedCloud> out;
   if (raw.empty()) return out;
   const auto owners = replace_rows(*Access::engine(context), options, naming, knowledge, raw);
-  UnknownViewpoints unknown(*Access::engine(context), span_of(raw), knowledge, options);
+  UnknownViewpoints unknown(*Access::engine(context), span_of(raw), knowledge, options, scales);
   std::vector<std::shared_ptr<PreparedState>> states;
   unknown.during([&](const SurfaceWatcher& watcher) {
     in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
@@ -140,6 +142,22 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   unknown.resolve(states);
   for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
   return out;
+}
+
+}  // namespace
+
+std::vector<PreparedCloud> prepare_batch(const Context& context,
+                                         const std::vector<PointCloudView>& clouds,
+                                         const PrepareOptions& options,
+                                         const std::vector<std::string>& names) {
+  return prepare_all(context, clouds, options, names, {});
+}
+
+std::vector<PreparedCloud> prepare_copies(const Context& context,
+                                          const std::vector<PointCloudView>& copies,
+                                          const std::vector<double>& scales,
+                                          const PrepareOptions& options) {
+  return prepare_all(context, copies, options, {}, scales);
 }
 
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud,

@@ -29,6 +29,8 @@ struct RawCloud {
   /// Points, normals and features are tight rows in memory of the engine's device, see
   /// DeviceEngine::adopt().
   bool on_device;
+  /// Features alone are wanted: what poses are verified by may be left out, which takes less time.
+  bool matched_only;
 };
 
 /// One pair for the stages. custom_*: given correspondences instead of features; null and 0

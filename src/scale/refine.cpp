@@ -87,8 +87,12 @@ struct Equations {
   }
 };
 
+/// A point of each cloud. The normal is that of both (Rusinkiewicz 2019, A Symmetric Objective
+/// Function for ICP): with that of one, and arms to the points of one, the scale of a pair and the
+/// inverse of that of the swapped pair would differ.
 struct Match {
   Eigen::Vector3d moved, normal, fixed;
+  Eigen::Vector3d middle() const { return 0.5 * (moved + fixed); }
 };
 
 Eigen::Vector3d wide(Vec3 p) {
@@ -169,34 +173,36 @@ RefinedScale refine_scale(const ClosestSurface& source, const ClosestSurface& ta
     const double reach = std::min(kIcpReach * width, static_cast<double>(target.distance()));
     std::vector<Match> matches;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    const auto add = [&](const Eigen::Vector3d& moved, const Eigen::Vector3d& fixed,
-                         const Eigen::Vector3d& of_source, const Eigen::Vector3d& of_target,
-                         bool by_target) {
-      if (!(std::abs(of_source.dot(of_target)) > kLeastCosine)) return;
-      matches.push_back({moved, by_target ? of_target : of_source, fixed});
-      sum += moved;
+    const auto add = [&](int of_source, int of_target) {
+      const Eigen::Vector3d n = rotation * wide(source.normal(of_source)),
+                            m = wide(target.normal(of_target));
+      const double cosine = n.dot(m);
+      if (!(std::abs(cosine) > kLeastCosine)) return;
+      const Eigen::Vector3d both = cosine < 0 ? Eigen::Vector3d(m - n) : Eigen::Vector3d(m + n);
+      matches.push_back({factor * (rotation * wide(source.point(of_source))) + shift,
+                         both.normalized(), wide(target.point(of_target))});
+      sum += matches.back().middle();
     };
     for (int k = 0; k < static_cast<int>(source.size()); k += stride) {
       const Eigen::Vector3d moved = factor * (rotation * wide(source.point(k))) + shift;
       const int found = target.closest(narrowed(moved), static_cast<float>(reach));
-      if (found >= 0)
-        add(moved, wide(target.point(found)), rotation * wide(source.normal(k)),
-            wide(target.normal(found)), true);
+      if (found >= 0) add(k, found);
     }
     for (int k = 0; k < static_cast<int>(target.size()); k += stride) {
       const Eigen::Vector3d fixed = wide(target.point(k));
       const int found = source.closest(narrowed(rotation.transpose() * (fixed - shift) / factor),
                                        static_cast<float>(reach / factor));
-      if (found >= 0)
-        add(factor * (rotation * wide(source.point(found))) + shift, fixed,
-            rotation * wide(source.normal(found)), wide(target.normal(k)), false);
+      if (found >= 0) add(found, k);
     }
     if (matches.size() * static_cast<std::size_t>(stride) < kLeastMatches) return {};
     const Eigen::Vector3d centre = sum / static_cast<double>(matches.size());
     Equations e;
     for (const Match& m : matches)
-      e.add(m.moved - centre, m.normal, m.normal.dot(m.moved - m.fixed), width);
+      e.add(m.middle() - centre, m.normal, m.normal.dot(m.moved - m.fixed), width);
     e.fill();
+    // What both clouds have was met from either side, and is one measurement.
+    e.information *= 0.5;
+    e.radius *= 0.5;
     out.factor = factor;
     out.information = e.information;
     out.points = e.points;

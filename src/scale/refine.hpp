@@ -45,7 +45,7 @@ struct RefinedScale {
 };
 
 /// Point-to-plane ICP with a free scale (Geman-McClure weights), from target_from_source of the
-/// points. The closest points of both clouds count: those of one alone make it smaller.
+/// points. The closest points of both clouds count alike: those of one alone make it smaller.
 /// @param kernel final width of the weights, in the unit of the target.
 RefinedScale refine_scale(const ClosestSurface& source, const ClosestSurface& target,
                           const UnalignedIsometry3d& target_from_source, float kernel);

@@ -7,6 +7,7 @@
 
 #include "api/access.hpp"
 #include "api/frames.hpp"
+#include "api/prepare_copies.hpp"
 #include "common/for_each_on.hpp"
 
 namespace gpureg::scale {
@@ -158,7 +159,8 @@ PreparedLadder::PreparedLadder(const Context& context, const PointCloudView& sou
                                const ScaleRange& range, const PrepareOptions& options)
     : source_(source) {
   PrepareOptions prepare = options;
-  prepare.surface_side_distance = 0;  // matches do not need it
+  prepare.surface_side_distance = 0;                   // matches need neither this ...
+  if (prepare.depth_maps > 0) prepare.depth_maps = 1;  // ... nor free space
   std::vector<std::unique_ptr<ScaledCloud>> clouds;
   std::vector<PointCloudView> views;
   const std::vector<double> scales = ladder_of(source, range, prepare.voxel_size);
@@ -168,11 +170,11 @@ PreparedLadder::PreparedLadder(const Context& context, const PointCloudView& sou
   }
   std::vector<PreparedCloud> prepared;
   try {
-    prepared = prepare_batch(context, views, prepare);
+    prepared = prepare_copies(context, views, scales, prepare);
   } catch (const InvalidArgument&) {
     // Scales at which no cloud can be prepared are none.
     for (const PointCloudView& view : views) try {
-        prepared.push_back(gpureg::prepare(context, view, prepare));
+        prepared.push_back(prepare_copies(context, {view}, {1.0}, prepare).front());
       } catch (const InvalidArgument&) {
         prepared.push_back({});
       }

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "algorithm/cell.hpp"
 #include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
@@ -21,6 +22,9 @@ namespace {
 /// Neighbours of the surface graph: about twenty lie within so many normal radii on a plane of
 /// prepared points.
 constexpr float kGraphRadius = 1.25f;
+
+/// Points of the copy that decides for the others, about: larger voxels bridge gaps and clutter.
+constexpr double kPointsOfDecision = 1500;
 
 /// Points that are prepared together: a preparation takes twice the memory of its result.
 constexpr std::size_t kPointsTogether = std::size_t(1) << 20;
@@ -85,9 +89,11 @@ struct Replacement {
   std::vector<float> features;
   std::uint32_t feature_dimension = 0;
 
+  bool matched_only;
+
   Replacement(const PointsAndNormals& surface, const SurfaceGraph::Signs& signs,
-              const PreparedState& state, bool own_features, float sign)
-      : points(surface.points), normals(surface.normals) {
+              const PreparedState& state, bool own_features, float sign, bool matches)
+      : points(surface.points), normals(surface.normals), matched_only(matches) {
     for (std::size_t i = 0; i < normals.size(); ++i)
       normals[i] = normals[i] * (sign * static_cast<float>(signs[i]));
     if (!own_features) return;
@@ -101,6 +107,7 @@ struct Replacement {
     out.size = points.size();
     out.point_stride = out.normal_stride = 3;
     out.normals = &normals.data()->x;
+    out.matched_only = matched_only;
     if (features.empty()) return out;
     out.features = features.data();
     out.feature_dimension = out.feature_stride = feature_dimension;
@@ -155,6 +162,60 @@ struct Inheritance {
   }
 };
 
+/// A surface with known sides, for the sides of a copy of it.
+class OrientedSurface {
+ public:
+  /// @param reach of a point's side, in the unit of the copy.
+  OrientedSurface(const PointsAndNormals& surface, const SurfaceGraph::Signs& signs,
+                  const float (&origin)[3], double factor, float reach)
+      : reach_(reach), inverse_(1 / reach) {
+    const auto scaled = [&](float x, float of_origin) {
+      return static_cast<float>((static_cast<double>(x) + static_cast<double>(of_origin)) * factor);
+    };
+    for (std::size_t i = 0; i < surface.points.size(); ++i) {
+      const Vec3 p = surface.points[i];
+      points_.push_back({scaled(p.x, origin[0]), scaled(p.y, origin[1]), scaled(p.z, origin[2])});
+      normals_.push_back(surface.normals[i] * static_cast<float>(signs[i]));
+      const Cell cell = cell_of(points_.back(), inverse_);
+      if (in_key_range(cell)) order_.emplace_back(cell_key(cell), static_cast<std::uint32_t>(i));
+    }
+    std::sort(order_.begin(), order_.end());
+  }
+
+  /// The side that the points around show, 1 without any.
+  std::int8_t sign_of(Vec3 point, Vec3 normal) const {
+    const Cell at = cell_of(point, inverse_);
+    float sum = 0;
+    for (std::int32_t z = at.z - 1; z <= at.z + 1; ++z)
+      for (std::int32_t y = at.y - 1; y <= at.y + 1; ++y) {
+        const Cell first{at.x - 1, y, z}, last{at.x + 1, y, z};
+        if (!in_key_range(first) || !in_key_range(last)) continue;
+        for (auto k = std::lower_bound(order_.begin(), order_.end(),
+                                       std::pair(cell_key(first), std::uint32_t{0}));
+             k != order_.end() && k->first <= cell_key(last); ++k) {
+          const float closeness =
+              1 - squared_norm(points_[k->second] - point) * inverse_ * inverse_;
+          if (closeness > 0) sum += closeness * dot(normals_[k->second], normal);
+        }
+      }
+    return sum < 0 ? -1 : 1;
+  }
+
+ private:
+  std::vector<Vec3> points_, normals_;
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> order_;  ///< by cell
+  float reach_, inverse_;
+};
+
+SurfaceGraph::Signs signs_like(const OrientedSurface& other, const PointsAndNormals& surface,
+                               const float (&origin)[3]) {
+  SurfaceGraph::Signs out;
+  for (std::size_t i = 0; i < surface.points.size(); ++i)
+    out.push_back(other.sign_of(surface.points[i] + Vec3{origin[0], origin[1], origin[2]},
+                                surface.normals[i]));
+  return out;
+}
+
 }  // namespace
 
 void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& state) {
@@ -169,11 +230,12 @@ void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& stat
 
 UnknownViewpoints::UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
                                      const std::vector<CloudKnowledge>& knowledge,
-                                     const PrepareOptions& options)
+                                     const PrepareOptions& options, std::vector<double> scales)
     : engine_(engine),
       raw_(raw),
       knowledge_(knowledge),
       options_(options),
+      scales_(std::move(scales)),
       spread_(raw.size),
       decisions_(raw.size) {}
 
@@ -207,7 +269,7 @@ void UnknownViewpoints::during(const std::function<void(const SurfaceWatcher&)>&
     any_open = any_open || is_open(k);
     if (asks_rows(k)) asked.push_back(k);
   }
-  if (!any_open || !engine_.leaves_host_idle()) return prepare(nullptr);
+  if (!any_open || !scales_.empty() || !engine_.leaves_host_idle()) return prepare(nullptr);
   SurfaceQueue queue;
   on_threads(2, [&](std::size_t thread) {
     if (thread == 0) {
@@ -247,6 +309,34 @@ void UnknownViewpoints::decide(std::size_t cloud, PointsAndNormals surface,
   out.made = true;
 }
 
+void UnknownViewpoints::decide_copies(const std::vector<std::shared_ptr<PreparedState>>& states,
+                                      const std::vector<std::size_t>& copies) {
+  const auto distance = [&](std::size_t k) {
+    return std::abs(std::log(static_cast<double>(states[k]->size) / kPointsOfDecision));
+  };
+  const std::size_t chosen =
+      *std::min_element(copies.begin(), copies.end(),
+                        [&](std::size_t a, std::size_t b) { return distance(a) < distance(b); });
+  decide(chosen, states[chosen]->copy_points_and_normals(), states[chosen]->origin);
+  const Decision& first = decisions_[chosen];
+  const bool sides = !first.sides.signs.empty();
+  threads().parallel(copies.size(), [&](std::size_t c) {
+    const std::size_t k = copies[c];
+    Decision& out = decisions_[k];
+    if (out.made) return;
+    out.made = true;
+    out.sides.source = first.sides.source;
+    out.sides.sign_known = first.sides.sign_known;
+    if (!sides) return;
+    out.surface = states[k]->copy_points_and_normals();
+    const double factor = scales_[k] / scales_[chosen];
+    out.sides.signs = signs_like(
+        OrientedSurface(first.surface, first.sides.signs, states[chosen]->origin, factor,
+                        options_.normal_radius * static_cast<float>(std::max(factor, 1.0))),
+        out.surface, states[k]->origin);
+  });
+}
+
 void UnknownViewpoints::set_statistics(std::size_t cloud, PrepareStatistics& statistics) const {
   const CloudKnowledge& known = knowledge_[cloud];
   const Decision& decision = decisions_[cloud];
@@ -264,7 +354,9 @@ void UnknownViewpoints::resolve(std::vector<std::shared_ptr<PreparedState>>& sta
   std::vector<std::size_t> undecided;
   for (std::size_t k = 0; k < states.size(); ++k)
     if (is_open(k) && !decisions_[k].made && states[k]->size > 0) undecided.push_back(k);
-  if (!undecided.empty())
+  if (!undecided.empty() && !scales_.empty())
+    decide_copies(states, undecided);
+  else if (!undecided.empty())
     threads().parallel(undecided.size(), [&](std::size_t k) {
       const PreparedState& state = *states[undecided[k]];
       decide(undecided[k], state.copy_points_and_normals(), state.origin);
@@ -283,7 +375,7 @@ void UnknownViewpoints::prepare_again(std::vector<std::shared_ptr<PreparedState>
     if (sides.signs.empty()) continue;
     const auto add = [&](float sign) {
       replacements.emplace_back(decisions_[k].surface, sides.signs, *states[k],
-                                knowledge_[k].features, sign);
+                                knowledge_[k].features, sign, raw_[k].matched_only);
     };
     add(1.0f);
     if (!sides.sign_known) add(-1.0f);

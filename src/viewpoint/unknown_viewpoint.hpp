@@ -40,8 +40,10 @@ void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& stat
 class UnknownViewpoints {
  public:
   /// @param raw rows of the points in host memory, which have to outlive this.
+  /// @param scales of clouds that are copies of one: one of them decides for all; otherwise none.
   UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
-                    const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options);
+                    const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options,
+                    std::vector<double> scales = {});
 
   /// Calls prepare(watcher), and meanwhile decides about the clouds whose surfaces the watcher
   /// gets, where a device leaves the host idle. Elsewhere the watcher is empty.
@@ -63,6 +65,8 @@ class UnknownViewpoints {
   bool asks_rows(std::size_t cloud) const;
   void measure_rows(std::size_t cloud);
   void decide(std::size_t cloud, PointsAndNormals surface, const float (&origin)[3]);
+  void decide_copies(const std::vector<std::shared_ptr<PreparedState>>& states,
+                     const std::vector<std::size_t>& copies);
   void set_statistics(std::size_t cloud, PrepareStatistics& statistics) const;
   void prepare_again(std::vector<std::shared_ptr<PreparedState>>& states);
   ThreadGroup& threads();
@@ -71,6 +75,7 @@ class UnknownViewpoints {
   Span<const RawCloud> raw_;
   const std::vector<CloudKnowledge>& knowledge_;
   const PrepareOptions& options_;
+  std::vector<double> scales_;
   std::vector<std::optional<SpacingSpread>> spread_;  ///< of each cloud, once measured
   std::vector<Decision> decisions_;                   ///< about each cloud
   std::unique_ptr<ThreadGroup> threads_;

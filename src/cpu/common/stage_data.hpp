@@ -29,6 +29,7 @@ struct DownsampledCloud {
   std::uint32_t feature_dimension = 0;
   std::vector<Vec3> viewpoints;  ///< local, at least one
   bool turns_normals = false;    ///< input normals that face away are flipped
+  bool matched_only = false;     ///< see RawCloud
 };
 
 struct CellTable {

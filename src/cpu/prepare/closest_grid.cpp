@@ -285,7 +285,7 @@ std::vector<std::shared_ptr<const ClosestGrid>> build_closest_grids(
            same_points(clouds[c].points, clouds[c - 1].points);
   };
   exec.parallel(clouds.size(), [&](std::size_t c) {
-    if (same_as_previous(c)) return;
+    if (clouds[c].matched_only || same_as_previous(c)) return;
     GrowingGrid& g = growing[c];
     g.geometry = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
     g.keys = reachable_blocks(clouds[c].points, g.geometry, kLeastKeys);

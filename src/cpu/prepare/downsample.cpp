@@ -31,6 +31,7 @@ void find_origin(const RawCloud& raw, float voxel_size, DownsampledCloud& out,
     }
   }
   out.input_points = raw.size;
+  out.matched_only = raw.matched_only;
   out.invalid_points = raw.size - finite.size();
   if (finite.empty()) return;
   for (int k = 0; k < 3; ++k) out.origin[k] = local_origin(lo[k], hi[k], voxel_size);
