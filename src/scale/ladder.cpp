@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "algorithm/cell.hpp"
+
 namespace gpureg::scale {
 namespace {
 
@@ -42,17 +44,22 @@ struct FiniteRows {
   std::size_t size() const { return rows.size() / 3; }
 
   std::size_t voxels(double voxel) const {
-    std::vector<std::uint64_t> keys(size());
+    std::size_t slots = 16;
+    while (slots < 2 * size()) slots *= 2;
+    std::vector<std::uint64_t> table(slots, kEmptyKey);  // open addressing
+    std::size_t count = 0;
     const double inverse = 1 / voxel;
     for (std::size_t k = 0; k < size(); ++k) {
       std::uint64_t key = 0;
       for (std::size_t a = 0; a < 3; ++a)
         key = key << 21 |
               static_cast<std::uint64_t>((static_cast<double>(rows[3 * k + a]) - low[a]) * inverse);
-      keys[k] = key;
+      std::size_t slot = cell_slot(key, static_cast<std::uint32_t>(slots - 1));
+      while (table[slot] != kEmptyKey && table[slot] != key) slot = (slot + 1) & (slots - 1);
+      count += table[slot] == kEmptyKey;
+      table[slot] = key;
     }
-    std::sort(keys.begin(), keys.end());
-    return static_cast<std::size_t>(std::unique(keys.begin(), keys.end()) - keys.begin());
+    return count;
   }
 };
 
