@@ -98,8 +98,10 @@ def near(limit):
     return lambda points, pose, truths: any(displacement(points, pose, t) < limit for t in truths)
 
 
-def fused(folder, fragments, count, rng):
-    """Fragments of a moving camera, each in the frame of its middle camera."""
+def fused(folder, fragments, count, rng, only_chosen=False):
+    """Fragments of a moving camera, each in the frame of its middle camera. only_chosen: those of no pair are None,
+    and not read.
+    """
     views = cameras(folder / "cameras.txt")
     frames = {}
     for line in (folder / "cameras.txt").read_text().splitlines():
@@ -116,22 +118,27 @@ def fused(folder, fragments, count, rng):
         r = np.eye(3) * (qw * qw - v @ v) + 2 * np.outer(v, v) + 2 * qw * cross
         t[:3, :3], t[:3, 3] = r.T, -r.T @ np.array([x, y, z])
         into.append(t)
-        points = rows_of(folder / f"cloud_bin_{k}.ply")
-        clouds.append(Cloud(moved(t, points), moved(t, np.array(views[k])), 3.0))
     pairs = [
         (j, i, [into[i] @ t @ np.linalg.inv(into[j])])
         for (i, j, _), t in matrices(folder / "gt.log")
         if j - i > 1
     ]
-    return [Set(clouds, chosen(pairs, count, rng), "0.05", near(0.2))]
+    pairs = chosen(pairs, count, rng)
+    for k in range(fragments):
+        if only_chosen and not any(k in pair[:2] for pair in pairs):
+            clouds.append(None)
+            continue
+        points = rows_of(folder / f"cloud_bin_{k}.ply")
+        clouds.append(Cloud(moved(into[k], points), moved(into[k], np.array(views[k])), 3.0))
+    return [Set(clouds, pairs, "0.05", near(0.2))]
 
 
-def kitchen(data, count, rng):
-    return fused(data / "redkitchen/fragments", 20, count, rng)
+def kitchen(data, count, rng, only_chosen=False):
+    return fused(data / "redkitchen/fragments", 20, count, rng, only_chosen)
 
 
-def house_a(data, count, rng):
-    return fused(data / "house/A", 50, count, rng)
+def house_a(data, count, rng, only_chosen=False):
+    return fused(data / "house/A", 50, count, rng, only_chosen)
 
 
 def hospital_e(data, count, rng):

@@ -8,15 +8,17 @@ Every cloud is moved by a random pose, and the source is divided by a factor, at
 confidence of 0.5; `recall_at_95`: share of the pairs with a correct pose among the most confident ones of
 which 95 % are correct; `scale_error`: median of |scale / factor - 1| of the correct pairs, and the share
 below 0.01; `times`: seconds of all pairs with an unknown scale / with the known one, preparation included.
-With --voxel auto sets take the voxel size that both clouds suggest at their true scale, as `known` does.
+`scale_errors` has the signed errors, log(scale / factor). With --voxel auto sets take the voxel size that both clouds suggest at their true scale, as `known` does.
 
 usage: run.py DATA [--sets kitchen,lidar] [--pairs 8] [--seeds 1 2 3] [--conditions free,one] [--backend cpu]
-       [--json OUT]
+       [--json OUT | --copy FOLDER]
+--copy: what these arguments read of DATA, points alone, to measure on another machine.
 Needs numpy and the Python package gpureg."""
 
 import argparse
 import json
 import pathlib
+import shutil
 import sys
 import time
 
@@ -37,6 +39,32 @@ def rigid_at(points, similarity):
     pose[:3, :3] /= np.cbrt(np.linalg.det(similarity[:3, :3]))
     pose[:3, 3] = similarity[:3, :3] @ centre + similarity[:3, 3] - pose[:3, :3] @ centre
     return pose
+
+
+def scenes_of(name, data, limit):
+    options = {"only_chosen": True} if name in ("kitchen", "house_a") else {}
+    return getattr(viewpoints, name)(data, limit, np.random.default_rng(0), **options)
+
+
+def copy(data, folder, sets, limit):
+    """What these sets read of data."""
+    opened, clouds, read = set(), set(), viewpoints.rows_of
+    # The package reads clouds, Python everything else.
+    sys.addaudithook(lambda event, a: opened.add(str(a[0])) if event == "open" else None)
+
+    def rows_of(path):
+        clouds.add(path)
+        return read(path)
+
+    viewpoints.rows_of = rows_of
+    for name in sets:
+        scenes_of(name, data, limit)
+    for path in {p for p in map(pathlib.Path, opened) if data in p.parents and p.is_file()}:
+        (folder / path.relative_to(data)).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, folder / path.relative_to(data))
+    for path in clouds:
+        (folder / path.relative_to(data)).parent.mkdir(parents=True, exist_ok=True)
+        gpureg.write_point_cloud(folder / path.relative_to(data), read(path).astype(np.float32))
 
 
 def recall_at(precision, outcomes):
@@ -100,7 +128,7 @@ def run(name, scenes, limit, seed, condition, context):
             searched.append((b.confidence, found, b.aligned))
             statuses[b.scale_status] = statuses.get(b.scale_status, 0) + 1
             if found:
-                errors.append(error)
+                errors.append(float(np.log(b.scale / factor)))
             print(
                 f"{name} {condition} {seed}: {s} {t} factor {factor:.3g}, known {of_known} {a.score:.3f}, "
                 f"searched {found} {b.confidence:.3f} {b.scale_status}, error {error:.4f}, "
@@ -115,10 +143,11 @@ def run(name, scenes, limit, seed, condition, context):
         "lost": sum(k[1] and not s[1] for k, s in zip(known, searched)),
         "won": sum(s[1] and not k[1] for k, s in zip(known, searched)),
         "statuses": statuses,
-        "scale_error": round(float(np.median(errors)), 5) if errors else None,
-        "scale_within_1_percent": round(float(np.mean(np.array(errors) < 0.01)), 4)
+        "scale_error": round(float(np.median(np.abs(errors))), 5) if errors else None,
+        "scale_within_1_percent": round(float(np.mean(np.abs(errors) < 0.01)), 4)
         if errors
         else None,
+        "scale_errors": [round(e, 5) for e in errors],
         "times": round(seconds[1] / max(1e-9, seconds[0]), 2),
     }
 
@@ -134,15 +163,16 @@ def main():
     parser.add_argument("--conditions", default="free")
     parser.add_argument("--backend", choices=("cpu", "cuda"), default="cpu")
     parser.add_argument("--json", type=pathlib.Path)
+    parser.add_argument("--copy", type=pathlib.Path)
     arguments = parser.parse_args()
+    if arguments.copy:
+        return copy(arguments.data, arguments.copy, arguments.sets.split(","), arguments.pairs)
     context = getattr(gpureg.Context, arguments.backend)()
     record = {"sets": {}}
     if arguments.json and arguments.json.exists():
         record = json.loads(arguments.json.read_text())
     for name in arguments.sets.split(","):
-        scenes = getattr(viewpoints, name)(
-            arguments.data, arguments.pairs, np.random.default_rng(0)
-        )
+        scenes = scenes_of(name, arguments.data, arguments.pairs)
         entry = {
             "command": f"bench/scale/run.py --sets {name} --pairs {arguments.pairs} "
             f"--seeds {' '.join(map(str, arguments.seeds))} --conditions {arguments.conditions}",
