@@ -178,6 +178,7 @@ def main():
             f"--seeds {' '.join(map(str, arguments.seeds))} --conditions {arguments.conditions}",
             "commit": commit(),
             "backend": arguments.backend,
+            "device": context.description,
         }
         for condition in arguments.conditions.split(","):
             entry[condition] = []

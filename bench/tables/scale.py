@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The table of unknown scales."""
+
+import statistics
+
+from tables.records import load
+
+GROUPS = {
+    "rooms, depth camera": ("kitchen",),
+    "house, simulated depth camera": ("house_a",),
+    "LiDAR": ("lidar", "kitti"),
+    "objects, range scanner": ("dragon",),
+    "objects, simulated range scanner": ("fgr",),
+    "CAD parts and scans": ("cad",),
+}
+
+
+def of_group(sets, condition):
+    """Pairs, correct with the known scale, correct with a searched one, lost; median error in per cent; the times."""
+    runs = [run for name in sets for run in name.get(condition, [])]
+    total = [
+        sum(r["pairs"] for r in runs),
+        sum(r["known"]["correct"] for r in runs),
+        sum(r["searched"]["correct"] for r in runs),
+        sum(r["lost"] for r in runs),
+    ]
+    # Records before the errors of the pairs have the median of each run.
+    errors = [abs(e) for r in runs for e in r.get("scale_errors", [r["scale_error"]])]
+    times = [r["times"] for r in runs]
+    return total, 100 * statistics.median(errors) if errors else None, times
+
+
+def scale():
+    record = load("scale.json")
+    rows = [
+        "| data | pairs | correct: scale known, `free` | median error of the scale, % | factor 1 given as `free`: pairs, lost | time, in pairs |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for shown, names in GROUPS.items():
+        sets = [record["sets"][name] for name in names if name in record["sets"]]
+        (pairs, known, free, _), error, times = of_group(sets, "free")
+        (one, _, _, lost), _, more = of_group(sets, "one")
+        if not pairs:
+            continue
+        shown_error = "-" if error is None else f"{error:.2f}"
+        shown_one = f"{one}, {lost}" if one else "-"
+        rows.append(
+            f"| {shown} | {pairs} | {known}, {free} | {shown_error} | {shown_one} "
+            f"| {min(times + more):.0f} to {max(times + more):.0f} |"
+        )
+    entries = list(record["sets"].values())
+    commits = sorted({e["commit"].rstrip("+") for e in entries})
+    devices = sorted({e.get("device", e["backend"]) for e in entries})
+    return [
+        *rows,
+        "",
+        f"Made by `bench/scale/run.py` at commit {', '.join(commits)} on {', '.join(devices)}.",
+    ]
+
+
+TABLES = {"scale": scale}
