@@ -17,7 +17,7 @@ std::shared_ptr<Engine> make_cuda_engine(const CudaOptions&) {
 std::vector<std::string> describe_cuda_devices() { return {"cuda: not in this build"}; }
 
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
-                                         const PrepareOptions& options, CudaStream) {
+                                         const RegistrationOptions& options, CudaStream) {
   options.validate();
   cloud.validate();
   throw InvalidArgument("clouds in device memory need a CUDA context, this one is " +
@@ -26,7 +26,7 @@ std::future<PreparedCloud> prepare_async(const Context& context, const DevicePoi
 
 std::future<std::vector<PreparedCloud>> prepare_batch_async(
     const Context& context, const std::vector<DevicePointCloudView>& clouds,
-    const PrepareOptions& options, const std::vector<CudaStream>&,
+    const RegistrationOptions& options, const std::vector<CudaStream>&,
     const std::vector<std::string>&) {
   options.validate();
   for (const DevicePointCloudView& cloud : clouds) cloud.validate();

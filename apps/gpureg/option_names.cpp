@@ -51,9 +51,8 @@ void set_voxel_size_origin(VoxelSizeOrigin origin) { voxel_size_origin() = origi
 
 std::string in_option_names(std::string message) {
   if (message.rfind("--set ", 0) == 0) return message;  // it lists fields
-  const std::array<std::pair<const char*, std::string>, 7> names{{
+  const std::array<std::pair<const char*, std::string>, 6> names{{
       {"suggest_voxel_size()", "--voxel-size auto"},
-      {"prepare.voxel_size", voxel_size_option()},
       {"voxel_size", voxel_size_option()},
       {"min_confidence", "--min-score"},
       {"accept_symmetry", "--set accept_symmetry=true"},

@@ -108,7 +108,7 @@ def evidence_of(command, scene, condition, seed, extra=()):
                 "points": [fragments[i]["points"], fragments[j]["points"]],
                 "viewpoints": [fragments[i]["viewpoint"], fragments[j]["viewpoint"]],
                 "refined": document["options"]["evidence"]["modes"],
-                "voxel_size": document["options"]["prepare"]["voxel_size"],
+                "voxel_size": document["options"]["voxel_size"],
                 "modes": [
                     {k: m[k] for k in ("evidence", "confidence", "equivalent") if k in m}
                     for m in modes

@@ -31,7 +31,7 @@ def poses(text):
     folder, run = pathlib.Path(folder), json.loads(pathlib.Path(result).read_text())
     truth, information = blocks(folder / "gt_all.log", 5), blocks(folder / "gt_all.info", 7)
     points = {f["number"]: f["points"] for f in run["fragments"]}
-    limit = max(MAX_ERROR, run["options"]["prepare"]["voxel_size"])
+    limit = max(MAX_ERROR, run["options"]["voxel_size"])
     out = []
     for pair in run["pairs"]:
         key = pair["i"], pair["j"]

@@ -48,12 +48,8 @@ def of_scene(scene, arguments, context):
     ]
     fragments = gpureg.FragmentSet.from_directory(folder)
     numbers = sorted({number for key in keys for number in key})
-    loaded = [
-        fragments.load(fragments.numbers.index(number), options.prepare) for number in numbers
-    ]
-    clouds = dict(
-        zip(numbers, gpureg._core.prepare_batch(context, loaded, options.prepare), strict=True)
-    )
+    loaded = [fragments.load(fragments.numbers.index(number), options) for number in numbers]
+    clouds = dict(zip(numbers, gpureg._core.prepare_batch(context, loaded, options), strict=True))
     random = np.random.default_rng(arguments.seed)
     found = {"true": [], "moved": []}
     for i, j in keys:

@@ -385,7 +385,7 @@ def run(command, scene, seed, rng, condition, total, extra):
         total["reported_up_to_symmetry"] += up_to_symmetry and good
         total["reported_up_to_symmetry_wrong"] += up_to_symmetry and not good
         outcomes.append((pose, good, record["score"]))
-    return document["options"]["prepare"]["voxel_size"], outcomes
+    return document["options"]["voxel_size"], outcomes
 
 
 def main():

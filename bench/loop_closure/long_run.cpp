@@ -77,7 +77,7 @@ void run(const std::string& folder, std::size_t fragments, std::size_t window, f
          double milliseconds) {
   const std::vector<Stop> stops = read_stops(folder);
   const Context context = Context::best();
-  loop_closure::Options options = loop_closure::Options::from_voxel_size(voxel);
+  loop_closure::Options options{RegistrationOptions{voxel}};
   options.chunk = 1;
   LoopCloser closer(context, options);
   UnalignedIsometry3d error = UnalignedIsometry3d::Identity();
@@ -96,7 +96,7 @@ void run(const std::string& folder, std::size_t fragments, std::size_t window, f
       odometry = odometry * step;
     }
     closer.add({id, 0, static_cast<double>(k),
-                prepare(context, stop.cloud.view(), options.registration.prepare), odometry});
+                prepare(context, stop.cloud.view(), options.registration), odometry});
     if (k > 0) closer.add_odometry(id, id - 1, step);
     if (k >= window) closer.remove(id - static_cast<loop_closure::FragmentId>(window));
     const auto start = std::chrono::steady_clock::now();

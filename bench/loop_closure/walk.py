@@ -16,7 +16,7 @@ def read_poses(path):
 
 def prepare(context, folder, numbers):
     fragments = gpureg.FragmentSet.from_directory(folder)
-    options = gpureg.RegistrationOptions().prepare
+    options = gpureg.RegistrationOptions()
     loaded = [fragments.load(fragments.numbers.index(number), options) for number in numbers]
     return gpureg._core.prepare_batch(context, loaded, options)
 

@@ -23,8 +23,8 @@ def write_one(output, number, points, normals, viewpoints, voxel=VOXEL):
     """One fragment from arrays into a folder; normals, viewpoints: perhaps None."""
     import gpureg
 
-    options = gpureg.RegistrationOptions.from_voxel_size(voxel).prepare
-    options.wide_feature_radius, options.depth_maps = 0.0, 0
+    options = gpureg.RegistrationOptions(voxel_size=voxel)
+    options.prepare.wide_feature_radius, options.prepare.depth_maps = 0.0, 0
     prepared = gpureg.prepare(
         points, normals, viewpoints=viewpoints, options=options, context=gpureg.Context.cpu()
     )

@@ -27,9 +27,9 @@ void report_each(benchmark::State& state, const std::vector<RegistrationResult>&
 
 /// "loopsmart_all": every quadruple that passes the polygon test is scored, as in the paper.
 RegistrationOptions preset(const std::string& name) {
-  if (name == "default") return RegistrationOptions::from_voxel_size(0.05f);
+  if (name == "default") return RegistrationOptions{0.05f};
   RegistrationOptions options = RegistrationOptions::loopsmart();
-  if (name == "loopsmart_all") options.quadruples.max_survivors = kAllSurvivors;
+  if (name == "loopsmart_all") options.tune = kAllSurvivors;
   return options;
 }
 
@@ -39,7 +39,7 @@ void align_many(benchmark::State& state, const std::string& backend,
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
-  const auto clouds = prepare_batch(*on, views(), options.prepare);
+  const auto clouds = prepare_batch(*on, views(), options);
   std::vector<Pair> pairs;
   for (std::int64_t k = 0; k < state.range(0); ++k)
     for (const Pair& pair : all_pairs()) pairs.push_back(pair);
@@ -58,7 +58,7 @@ void align_one(benchmark::State& state, const std::string& backend,
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
-  const auto clouds = prepare_batch(*on, views(), options.prepare);
+  const auto clouds = prepare_batch(*on, views(), options);
   const auto pairs = all_pairs();
   std::vector<RegistrationResult> results{
       align(*on, clouds[pairs[0].source], clouds[pairs[0].target], options)};
@@ -79,7 +79,7 @@ void align_from_threads(benchmark::State& state, const std::string& backend,
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
-  const auto clouds = prepare_batch(*on, views(), options.prepare);
+  const auto clouds = prepare_batch(*on, views(), options);
   const auto pairs = all_pairs();
   std::vector<RegistrationResult> results(pairs.size());
   const auto align_all = [&] {
@@ -137,14 +137,14 @@ void redwood_sized(benchmark::State& state, const std::string& backend,
       if (step % scene.size() != 0) pairs.push_back({i + step, i});
   // A new context: memory reserved by other benchmarks would hide the use of this one.
   const Context on = new_context(backend);
-  align_batch(on, prepare_batch(on, {raw.begin(), raw.begin() + 20}, options.prepare), all_pairs(),
+  align_batch(on, prepare_batch(on, {raw.begin(), raw.begin() + 20}, options), all_pairs(),
               options);
   std::vector<RegistrationResult> results;
   std::size_t runs = 0;
   double prepare_ms = 0;
   const auto run = [&] {
     const auto begin = Clock::now();
-    const auto clouds = prepare_batch(on, raw, options.prepare);
+    const auto clouds = prepare_batch(on, raw, options);
     prepare_ms += since(begin);
     results = align_batch(on, clouds, pairs, options);
   };

@@ -19,7 +19,7 @@ std::vector<PointCloudView> views();
 std::vector<Pair> all_pairs();
 
 /// QuadrupleOptions::max_survivors that real pairs stay below.
-constexpr std::uint32_t kAllSurvivors = 1u << 18;
+constexpr const char* kAllSurvivors = "quadruples.max_survivors=262144";
 
 /// Means over the results, and milliseconds per pair of that many runs.
 void report(benchmark::State& state, const std::vector<RegistrationResult>& results,

@@ -58,24 +58,6 @@ SETTINGS = {
 QUALITIES = {f"quality {k}": k for k in range(11)}
 
 
-EFFORTS = ("max_matches", "seeds", "triangles", "max_members")
-
-
-def efforts(gpureg, quality):
-    options = gpureg.RegistrationOptions().with_quality(quality)
-    out = {f"compatibility.{name}": getattr(options.compatibility, name) for name in EFFORTS}
-    return {**out, "evidence.modes": options.evidence.modes}
-
-
-def apply(options, changes):
-    for name, value in changes.items():
-        *path, field = name.split(".")
-        of = options
-        for part in path:
-            of = getattr(of, part)
-        setattr(of, field, value)
-
-
 class Scene:
     """Prepared clouds and truth. moved: motions of the clouds, or None."""
 
@@ -96,15 +78,15 @@ class Scene:
                 points = np.asarray(cloud.points) @ q.T + motion[:3, 3]
                 clouds.append(points.astype(np.float32))
             else:
-                clouds.append(fragments.load(position, options.prepare))
+                clouds.append(fragments.load(position, options))
             self.motions.append(motion)
         if moved:
             clouds = [
-                gpureg._arrays.core_cloud(c, None, None, None, options.prepare, "cloud", False)
+                gpureg._arrays.core_cloud(c, None, None, None, options, "cloud", False)
                 for c in clouds
             ]
         start = time.perf_counter()
-        self.clouds = gpureg._core.prepare_batch(context, clouds, options.prepare)
+        self.clouds = gpureg._core.prepare_batch(context, clouds, options)
         self.seconds = time.perf_counter() - start
         n = len(self.numbers)
         self.pairs = np.array([(j, i) for i in range(n) for j in range(i + 1, n)], np.uint32)
@@ -191,10 +173,12 @@ def measure(arguments):
             align_all(gpureg, context, scene, options)  # the first call allocates
             for name in arguments.settings or names:
                 for seed in arguments.seeds:
-                    options = gpureg.RegistrationOptions(seed=seed)
-                    if name in QUALITIES:
-                        options = options.with_quality(QUALITIES[name])
-                    apply(options, SETTINGS.get(name, {}))
+                    changes = SETTINGS.get(name, {})
+                    options = gpureg.RegistrationOptions(
+                        seed=seed,
+                        quality=QUALITIES.get(name, 5),
+                        tune=" ".join(f"{key}={value}" for key, value in changes.items()),
+                    )
                     results, seconds = align_all(gpureg, context, scene, options)
                     rows.append(
                         {
@@ -213,7 +197,7 @@ def measure(arguments):
         {
             "device": context.description,
             "settings": {
-                **{name: efforts(gpureg, quality) for name, quality in QUALITIES.items()},
+                **{name: {"quality": quality} for name, quality in QUALITIES.items()},
                 **SETTINGS,
             },
             "rows": rows,

@@ -108,12 +108,12 @@ void run(const gpureg::Context& context, std::size_t wanted, bool with_viewpoint
     for (int room = 0; room < rooms; ++room) map_viewpoints.push_back(building.viewpoint(room));
     scan_viewpoints.push_back(motion * building.viewpoint(rooms / 2));
   }
-  const auto options = gpureg::RegistrationOptions::from_voxel_size(kVoxel);
+  const auto options = gpureg::RegistrationOptions{kVoxel};
 
   auto begin = Clock::now();
-  const auto target = gpureg::prepare(context, view_of(map, map_viewpoints), options.prepare);
+  const auto target = gpureg::prepare(context, view_of(map, map_viewpoints), options);
   const double prepared = seconds_since(begin);
-  const auto source = gpureg::prepare(context, view_of(scan, scan_viewpoints), options.prepare);
+  const auto source = gpureg::prepare(context, view_of(scan, scan_viewpoints), options);
   begin = Clock::now();
   const auto result = gpureg::align(context, source, target, options);
   const double aligned = seconds_since(begin);

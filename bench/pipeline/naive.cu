@@ -141,7 +141,7 @@ struct Naive::Arrays {
   Array<Support> supports;
 };
 
-Naive::Naive(std::size_t most_points, const RegistrationOptions& options)
+Naive::Naive(std::size_t most_points, const RegistrationSettings& options)
     : options_(options), arrays_(std::make_unique<Arrays>(most_points, options.quadruples.count)) {}
 Naive::~Naive() = default;
 

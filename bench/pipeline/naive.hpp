@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "algorithm/support.hpp"
-#include "gpureg/options.hpp"
 #include "hash_grid.hpp"
 #include "pipeline/engine.hpp"
+#include "settings/resolve.hpp"
 
 namespace gpureg::bench {
 
@@ -23,7 +23,7 @@ struct NaiveResult {
 /// taken beforehand. Finds what the library finds.
 class Naive {
  public:
-  Naive(std::size_t most_points, const RegistrationOptions& options);
+  Naive(std::size_t most_points, const RegistrationSettings& options);
   ~Naive();
   NaiveResult align(const PreparedState& source, const PreparedState& target);
   /// Grid of a cloud, part of its preparation: the first call makes it, which takes long.
@@ -31,7 +31,7 @@ class Naive {
 
  private:
   struct Arrays;
-  RegistrationOptions options_;
+  RegistrationSettings options_;
   std::unique_ptr<Arrays> arrays_;
   std::vector<Support> supports_;
   std::unordered_map<const PreparedState*, std::unique_ptr<HashGrid>> grids_;

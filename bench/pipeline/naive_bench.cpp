@@ -15,13 +15,13 @@ void paper_mode(benchmark::State& state) {
   const Context* on = context(state, "cuda");
   if (!on) return;
   RegistrationOptions options = RegistrationOptions::loopsmart();
-  options.quadruples.max_survivors = kAllSurvivors;
-  const auto clouds = prepare_batch(*on, views(), options.prepare);
+  options.tune = kAllSurvivors;
+  const auto clouds = prepare_batch(*on, views(), options);
   const auto pairs = all_pairs();
   const auto expected = align_batch(*on, clouds, pairs, options);
   std::size_t most = 0;
   for (const PreparedCloud& cloud : clouds) most = std::max(most, cloud.size());
-  Naive naive(most, options);
+  Naive naive(most, resolve(options));
   for (const PreparedCloud& cloud : clouds) naive.grid_of(*Access::state(cloud));
   naive.align(*Access::state(clouds[pairs[0].source]), *Access::state(clouds[pairs[0].target]));
   std::vector<double> ms;

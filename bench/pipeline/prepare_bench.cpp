@@ -34,8 +34,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
 }
 
 RegistrationOptions preset(const std::string& name) {
-  return name == "default" ? RegistrationOptions::from_voxel_size(0.05f)
-                           : RegistrationOptions::loopsmart();
+  return name == "default" ? RegistrationOptions{0.05f} : RegistrationOptions::loopsmart();
 }
 
 /// All fragments of the scene from host memory in one call.
@@ -44,10 +43,10 @@ void prepare_all(benchmark::State& state, const std::string& backend,
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
-  std::vector<PreparedCloud> clouds = prepare_batch(*on, all, options.prepare);
+  std::vector<PreparedCloud> clouds = prepare_batch(*on, all, options);
   std::size_t runs = 0;
   for (auto _ : state) {
-    clouds = prepare_batch(*on, all, options.prepare);
+    clouds = prepare_batch(*on, all, options);
     ++runs;
   }
   report(state, clouds, runs);
@@ -77,9 +76,9 @@ void prepare_one_fragment(benchmark::State& state, const std::string& backend,
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
   const auto all = views();
-  std::vector<PreparedCloud> cloud{prepare(*on, all[0], options.prepare)};
+  std::vector<PreparedCloud> cloud{prepare(*on, all[0], options)};
   std::size_t runs = 0;
-  for (auto _ : state) cloud[0] = prepare(*on, all[runs++ % all.size()], options.prepare);
+  for (auto _ : state) cloud[0] = prepare(*on, all[runs++ % all.size()], options);
   report(state, cloud, runs);
 }
 

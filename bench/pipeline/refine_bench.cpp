@@ -7,18 +7,18 @@ namespace {
 
 /// The scene as a map before its joint refinement.
 struct Scene {
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
+  RegistrationOptions options = RegistrationOptions{0.05f};
   std::vector<reconstruction::Surface> surfaces;
   reconstruction::Reconstruction map;
 
   Scene() {
     const Context best = Context::best();
-    const auto clouds = prepare_batch(best, views(), options.prepare);
+    const auto clouds = prepare_batch(best, views(), options);
     const auto pairs = all_pairs();
     map = reconstruction::reconstruct_from_poses(clouds.size(), pairs,
                                                  align_batch(best, clouds, pairs, options));
     for (const PreparedCloud& cloud :
-         prepare_batch(best, views(), reconstruction::surface_options(options.prepare)))
+         prepare_batch(best, views(), reconstruction::surface_options(options)))
       surfaces.push_back(reconstruction::surface_of(cloud));
   }
 };
@@ -28,7 +28,7 @@ void refine_map(benchmark::State& state, const std::string& backend, std::uint32
   const Context* on = context(state, backend);
   if (!on) return;
   static const Scene scene;
-  auto options = reconstruction::RefineOptions::for_depth_cameras(scene.options.prepare.voxel_size);
+  auto options = reconstruction::RefineOptions::for_depth_cameras(scene.options.voxel_size);
   options.max_points = max_points;
   reconstruction::RefineReport report;
   for (auto _ : state) {

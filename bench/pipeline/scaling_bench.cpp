@@ -96,7 +96,7 @@ void points_per_cloud(benchmark::State& state) {
   const auto raw = scans(hall, 8, static_cast<std::size_t>(state.range(0)) * 10);
   const RegistrationOptions options =
       RegistrationOptions::loopsmart(voxel_for(hall, state.range(0)));
-  const auto clouds = prepare_batch(*on, views_of(raw), options.prepare);
+  const auto clouds = prepare_batch(*on, views_of(raw), options);
   std::vector<Pair> pairs;
   for (std::uint32_t i = 0; i < clouds.size(); ++i)
     for (std::uint32_t j = i + 1; j < clouds.size(); ++j) pairs.push_back({j, i});
@@ -111,11 +111,10 @@ void pair_by_default(benchmark::State& state) {
   if (!context(state, "cuda")) return;
   const Hall hall;
   const auto raw = scans(hall, 2, static_cast<std::size_t>(state.range(0)) * 10);
-  const RegistrationOptions options =
-      RegistrationOptions::from_voxel_size(voxel_for(hall, state.range(0)));
+  const RegistrationOptions options = RegistrationOptions{voxel_for(hall, state.range(0))};
   // A new context: memory reserved by other benchmarks would hide the use of this one.
   const Context on = new_context("cuda");
-  const auto clouds = prepare_batch(on, views_of(raw), options.prepare);
+  const auto clouds = prepare_batch(on, views_of(raw), options);
   std::vector<RegistrationResult> results{align(on, clouds[1], clouds[0], options)};
   for (auto _ : state) results.front() = align(on, clouds[1], clouds[0], options);
   report(state, results, static_cast<std::size_t>(state.iterations()));
@@ -128,8 +127,8 @@ void raw_points(benchmark::State& state) {
   const Hall hall;
   const auto raw = scans(hall, 4, static_cast<std::size_t>(state.range(0)));
   const RegistrationOptions options = RegistrationOptions::loopsmart();
-  auto clouds = prepare_batch(*on, views_of(raw), options.prepare);
-  for (auto _ : state) clouds = prepare_batch(*on, views_of(raw), options.prepare);
+  auto clouds = prepare_batch(*on, views_of(raw), options);
+  for (auto _ : state) clouds = prepare_batch(*on, views_of(raw), options);
   state.counters["points"] = static_cast<double>(clouds[0].size());
   state.counters["ms_per_fragment"] = benchmark::Counter(
       4e-3, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
@@ -150,8 +149,7 @@ void many_fragments(benchmark::State& state) {
     for (std::uint32_t step = 1; step <= 4; ++step) pairs.push_back({k, (k + step) % count});
   }
   std::vector<RegistrationResult> results;
-  for (auto _ : state)
-    results = align_batch(*on, prepare_batch(*on, raw, options.prepare), pairs, options);
+  for (auto _ : state) results = align_batch(*on, prepare_batch(*on, raw, options), pairs, options);
   state.counters["fragments"] = count;
   state.counters["pairs"] = static_cast<double>(pairs.size());
   state.counters["ms_per_fragment"] = benchmark::Counter(

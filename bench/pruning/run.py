@@ -134,7 +134,7 @@ def main():
             gpureg.FragmentSet.from_clouds(clouds),
             {"country": pairs},
             arguments.shares,
-            gpureg.RegistrationOptions.loopsmart(COUNTRY_VOXEL).prepare,
+            gpureg.RegistrationOptions.loopsmart(COUNTRY_VOXEL),
         )
     generated = "".join(f" {folder.name}" for folder in arguments.generated)
     shares = " ".join(f"{share:g}" for share in arguments.shares)

@@ -103,7 +103,7 @@ def run(name, scenes, limit, seed, condition, context):
                 if scene.voxel == "auto"
                 else float(scene.voxel)
             )
-            options = gpureg.RegistrationOptions.from_voxel_size(voxel)
+            options = gpureg.RegistrationOptions(voxel_size=voxel)
             options.seed = seed
 
             def correct(similarity, scene=scene, clouds=clouds, poses=poses, truths=truths):

@@ -142,7 +142,7 @@ std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, const Row
 // engine may depend on them, as other calls need both. The preparation reads the rows on the
 // device, without a copy.
 std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_adopted(
-    Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) {
+    Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareSettings& options) {
   std::vector<RawCloud> raw;
   for (const std::shared_ptr<AdoptedCloud>& cloud : clouds) {
     const Adopted& adopted = static_cast<const Adopted&>(*cloud);

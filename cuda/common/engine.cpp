@@ -62,7 +62,7 @@ std::vector<EarlySurface> copy_surfaces(Exec& exec, const DownsampledClouds& clo
 
 /// @param first index of the first cloud for the watcher, which may be empty.
 std::vector<std::shared_ptr<PreparedCloud>> prepare_chunk(Exec& exec, Span<const RawCloud> clouds,
-                                                          const PrepareOptions& options,
+                                                          const PrepareSettings& options,
                                                           const SurfaceWatcher& watcher,
                                                           std::size_t first) {
   exec.begin();
@@ -87,7 +87,7 @@ std::vector<pipeline::Run> chunks_of(Span<const RawCloud> clouds, std::size_t po
 }
 
 void align_views(Exec& exec, Span<const PairInput> pairs, Span<const PairView> views,
-                 const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+                 const RegistrationSettings& options, Span<PairOutcome> outcomes) {
   if (options.method == RegistrationMethod::compatibility)
     pipeline::align_by_compatibility(exec, pairs, views, options, outcomes);
   else
@@ -170,12 +170,12 @@ void CudaEngine::on_lanes(const Lanes::Held& held, std::size_t count, const Work
 // Memory of a pair: a bit per hypothesis, rounded up to chunks; a bit per seed and match, the sums
 // of a fit, a pose and its evidence per seed, the columns, the row and the keys of each match, and
 // the sampled points.
-std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
+std::size_t CudaEngine::pairs_per_chunk(const RegistrationSettings& options) const {
   constexpr std::size_t kChunkBytes = 4096, kSeedBytes = 192, kMatchBytes = 160,
                         kSampleBytesPerPoint = 112;
   std::size_t fit = kSampleBytes / (options.quadruples.count / 8 + kChunkBytes);
   if (options.method == RegistrationMethod::compatibility) {
-    const CompatibilityOptions& c = options.compatibility;
+    const CompatibilitySettings& c = options.compatibility;
     fit = kNeighborhoodBytes / (std::size_t(c.seeds) * (c.max_matches / 8 + kSeedBytes) +
                                 std::size_t(c.max_matches) * kMatchBytes +
                                 std::size_t(options.evidence.sample) * kSampleBytesPerPoint);
@@ -183,12 +183,13 @@ std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) cons
   return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
 }
 
-CudaEngine::Clouds CudaEngine::prepare(Span<const RawCloud> clouds, const PrepareOptions& options) {
+CudaEngine::Clouds CudaEngine::prepare(Span<const RawCloud> clouds,
+                                       const PrepareSettings& options) {
   return prepare_watched(clouds, options, nullptr);
 }
 
 CudaEngine::Clouds CudaEngine::prepare_watched(Span<const RawCloud> clouds,
-                                               const PrepareOptions& options,
+                                               const PrepareSettings& options,
                                                const SurfaceWatcher& watcher) {
   if (has_budget()) return prepare_within_budget(clouds, options, watcher);
   if (chunks_of(clouds, kRawPointsPerChunk).size() > 1)
@@ -201,7 +202,7 @@ CudaEngine::Clouds CudaEngine::prepare_watched(Span<const RawCloud> clouds,
 
 CudaEngine::Clouds CudaEngine::prepare_on_lanes(Span<const RawCloud> clouds,
                                                 const std::vector<pipeline::Run>& chunks,
-                                                const PrepareOptions& options,
+                                                const PrepareSettings& options,
                                                 const SurfaceWatcher& watcher) {
   const Lanes::Held held = lanes_.together();
   std::vector<std::vector<std::shared_ptr<PreparedCloud>>> made(chunks.size());
@@ -219,7 +220,7 @@ CudaEngine::Clouds CudaEngine::prepare_on_lanes(Span<const RawCloud> clouds,
 }
 
 CudaEngine::Clouds CudaEngine::prepare_within_budget(Span<const RawCloud> clouds,
-                                                     const PrepareOptions& options,
+                                                     const PrepareSettings& options,
                                                      const SurfaceWatcher& watcher) {
   const Lanes::Held held = lanes_.all();
   const DeviceScope scope(device());
@@ -280,7 +281,7 @@ void CudaEngine::for_runs_within_budget(Span<const PairInput> pairs, const Work&
   }
 }
 
-void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options,
+void CudaEngine::align(Span<const PairInput> pairs, const RegistrationSettings& options,
                        Span<PairOutcome> outcomes) {
   const bool large = pairs.size >= kPairsOfLanes;
   const Lanes::Held held = has_budget() ? lanes_.all() : large ? lanes_.together() : lanes_.any();
@@ -301,7 +302,7 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
 }
 
 void CudaEngine::align_on(const Lanes::Held& held, Span<const PairInput> pairs,
-                          const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+                          const RegistrationSettings& options, Span<PairOutcome> outcomes) {
   held.exec().begin();
   const ResidentPairs resident = bring(held.exec(), pairs);
   const WaitOnFailure wait(held);
@@ -309,7 +310,7 @@ void CudaEngine::align_on(const Lanes::Held& held, Span<const PairInput> pairs,
 }
 
 void CudaEngine::align_on_lane(std::size_t lane, Span<const PairInput> pairs,
-                               const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+                               const RegistrationSettings& options, Span<PairOutcome> outcomes) {
   const Lanes::Held held = lanes_.one(lane);
   const DeviceScope scope(device());
   align_on(held, pairs, options, outcomes);
@@ -317,7 +318,7 @@ void CudaEngine::align_on_lane(std::size_t lane, Span<const PairInput> pairs,
 }
 
 std::vector<FeatureMatches> CudaEngine::match(Span<const PairInput> pairs,
-                                              const RegistrationOptions& options) {
+                                              const RegistrationSettings& options) {
   const Lanes::Held held = has_budget() ? lanes_.all() : lanes_.any();
   const DeviceScope scope(device());
   std::vector<FeatureMatches> out;
@@ -341,7 +342,7 @@ std::vector<FeatureMatches> CudaEngine::match(Span<const PairInput> pairs,
 }
 
 void CudaEngine::verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
-                        const RegistrationOptions& options, bool refine,
+                        const RegistrationSettings& options, bool refine,
                         Span<PairOutcome> outcomes) {
   const Lanes::Held held = has_budget() ? lanes_.all() : lanes_.any();
   const DeviceScope scope(device());

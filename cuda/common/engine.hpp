@@ -27,26 +27,27 @@ class CudaEngine final : public DeviceEngine {
   void allow_copies_to(const CudaEngine& other);
   std::vector<DeviceMemoryUse> device_memory() const override;
   void trim() override;
-  std::size_t pairs_per_chunk(const RegistrationOptions& options) const override;
+  std::size_t pairs_per_chunk(const RegistrationSettings& options) const override;
   void check_on_host(const RawCloud& cloud) const override;
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareOptions& options) override;
+                                                      const PrepareSettings& options) override;
   std::vector<std::shared_ptr<PreparedState>> prepare_watched(
-      Span<const RawCloud> clouds, const PrepareOptions& options,
+      Span<const RawCloud> clouds, const PrepareSettings& options,
       const SurfaceWatcher& watcher) override;
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override;
   std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
-      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override;
+      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareSettings& options) override;
   std::vector<float> copy_points(const AdoptedCloud& cloud) override;
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+  void align(Span<const PairInput> pairs, const RegistrationSettings& options,
              Span<PairOutcome> outcomes) override;
   /// On one lane; other threads may use the others at the same time. Requires !has_budget().
   void align_on_lane(std::size_t lane, Span<const PairInput> pairs,
-                     const RegistrationOptions& options, Span<PairOutcome> outcomes);
+                     const RegistrationSettings& options, Span<PairOutcome> outcomes);
   std::vector<FeatureMatches> match(Span<const PairInput> pairs,
-                                    const RegistrationOptions& options) override;
+                                    const RegistrationSettings& options) override;
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
-              const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) override;
+              const RegistrationSettings& options, bool refine,
+              Span<PairOutcome> outcomes) override;
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override;
   std::unique_ptr<PlanMatcher> match_plan(const plan::Map& map) override;
 
@@ -66,17 +67,17 @@ class CudaEngine final : public DeviceEngine {
   std::size_t end_within_budget(Span<const PairInput> pairs, std::size_t begin) const;
   ResidentPairs bring(Exec& exec, Span<const PairInput> pairs);
   void align_on(const Lanes::Held& held, Span<const PairInput> pairs,
-                const RegistrationOptions& options, Span<PairOutcome> outcomes);
+                const RegistrationSettings& options, Span<PairOutcome> outcomes);
   /// Calls work(begin, end) for runs of pairs whose clouds are within the memory budget together.
   template <typename Work>
   void for_runs_within_budget(Span<const PairInput> pairs, const Work& work);
 
   /// Chunk after chunk, each as large as the memory budget allows after those before it.
-  Clouds prepare_within_budget(Span<const RawCloud> clouds, const PrepareOptions& options,
+  Clouds prepare_within_budget(Span<const RawCloud> clouds, const PrepareSettings& options,
                                const SurfaceWatcher& watcher);
   /// Chunks on both lanes in turns: while one uploads, the other computes.
   Clouds prepare_on_lanes(Span<const RawCloud> clouds, const std::vector<pipeline::Run>& chunks,
-                          const PrepareOptions& options, const SurfaceWatcher& watcher);
+                          const PrepareSettings& options, const SurfaceWatcher& watcher);
 
   Lanes lanes_;
   Residence residence_;

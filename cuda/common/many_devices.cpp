@@ -70,13 +70,13 @@ class EngineOfMany final : public DeviceEngine {
   void trim() override {
     for (const auto& engine : engines_) engine->trim();
   }
-  std::size_t pairs_per_chunk(const RegistrationOptions& options) const override {
+  std::size_t pairs_per_chunk(const RegistrationSettings& options) const override {
     return engines_[0]->pairs_per_chunk(options) * kChunksPerDevice * engines_.size();
   }
 
   void check_on_host(const RawCloud& cloud) const override { engines_[0]->check_on_host(cloud); }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareOptions& options) override {
+                                                      const PrepareSettings& options) override {
     std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
     const std::size_t share = clouds.size / engines_.size();
     SharedRuns runs(clouds.size, std::clamp(share, kMinClouds, kMostMinClouds), kMaxClouds,
@@ -97,7 +97,7 @@ class EngineOfMany final : public DeviceEngine {
   }
   // Each device prepares the clouds that it holds.
   std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
-      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override {
+      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareSettings& options) override {
     std::vector<std::vector<std::shared_ptr<AdoptedCloud>>> share(engines_.size());
     std::vector<std::vector<std::size_t>> place(engines_.size());
     for (std::size_t k = 0; k < clouds.size; ++k) {
@@ -117,7 +117,7 @@ class EngineOfMany final : public DeviceEngine {
     return out;
   }
 
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+  void align(Span<const PairInput> pairs, const RegistrationSettings& options,
              Span<PairOutcome> outcomes) override {
     const std::size_t most = engines_[0]->pairs_per_chunk(options);
     if (bounded_) {
@@ -141,12 +141,12 @@ class EngineOfMany final : public DeviceEngine {
 
   /// On the first device: the matches of a few pairs take a millisecond.
   std::vector<FeatureMatches> match(Span<const PairInput> pairs,
-                                    const RegistrationOptions& options) override {
+                                    const RegistrationSettings& options) override {
     return engines_[0]->match(pairs, options);
   }
 
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
-              const RegistrationOptions& options, bool refine,
+              const RegistrationSettings& options, bool refine,
               Span<PairOutcome> outcomes) override {
     SharedRuns runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options), engines_.size());
     on_all(runs, pairs.size > kMinPairs,

@@ -152,7 +152,7 @@ __global__ void take_seeds(SeedBatch b, const std::uint32_t* ranked, std::uint32
 
 }  // namespace
 
-Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptions& options) {
+Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationSettings& options) {
   const std::size_t pairs = matches.room.entries();
   const unsigned pair_count = static_cast<unsigned>(pairs);
   Seeds out;

@@ -317,9 +317,9 @@ __global__ void __launch_bounds__(kThreads) refit(SeedFits b) {
 }  // namespace
 
 SeedPoses fit_seeds(Exec& exec, const MatchSets& matches, const Seeds& seeds,
-                    const RegistrationOptions& options) {
+                    const RegistrationSettings& options) {
   static_assert(kNoPose == 0, "see SeedPoses::valid");
-  const CompatibilityOptions& o = options.compatibility;
+  const CompatibilitySettings& o = options.compatibility;
   const std::size_t pairs = matches.room.entries(), places = pairs * seeds.most;
   SeedPoses out{exec.buffer<Pose<float>>(places), exec.filled<std::uint8_t>(places, kNoPose)};
   const std::uint32_t largest = matches.room.largest;

@@ -17,6 +17,6 @@ struct SeedPoses {
 /// Kernels with a thread block per seed choose triangles and sum up consensus sets; kernels with a
 /// thread per seed solve for the poses.
 SeedPoses fit_seeds(Exec& exec, const MatchSets& matches, const Seeds& seeds,
-                    const RegistrationOptions& options);
+                    const RegistrationSettings& options);
 
 }  // namespace gpureg::cuda

@@ -25,7 +25,7 @@ __device__ inline PackedMatch packed(const OrientedMatch& o) {
   return {{o.p.x, o.p.y, o.p.z, o.q.x}, {o.q.y, o.q.z, o.m.x, o.m.y}, {o.m.z, o.n.x, o.n.y, o.n.z}};
 }
 
-inline CompatibilityTest test_of(const CompatibilityOptions& options) {
+inline CompatibilityTest test_of(const CompatibilitySettings& options) {
   return compatibility_test(options.tolerance, options.max_turn);
 }
 

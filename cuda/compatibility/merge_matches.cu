@@ -209,7 +209,7 @@ struct Answers {
 };
 
 /// Runs all searches of the batch and sets those of each pair.
-Answers search(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options,
+Answers search(Exec& exec, Span<const PairView> pairs, const RegistrationSettings& options,
                std::vector<MergePair>& entries) {
   std::vector<FeatureQuery> queries;
   std::vector<QuerySample> samples;
@@ -264,7 +264,7 @@ Answers search(Exec& exec, Span<const PairView> pairs, const RegistrationOptions
 }  // namespace
 
 MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
-                        const RegistrationOptions& options) {
+                        const RegistrationSettings& options) {
   std::vector<MergePair> entries(pairs.size);
   const auto answers = search(exec, pairs, options, entries);
   std::vector<DeviceBuffer<std::uint32_t>> custom;

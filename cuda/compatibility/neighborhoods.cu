@@ -49,7 +49,7 @@ __global__ void __launch_bounds__(kThreads)
 }  // namespace
 
 Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const Seeds& seeds,
-                                 const CompatibilityOptions& options) {
+                                 const CompatibilitySettings& options) {
   const std::size_t pairs = matches.room.entries();
   const std::uint32_t largest = matches.room.largest;
   Neighborhoods out;

@@ -13,6 +13,6 @@ struct Neighborhoods {
 };
 
 Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const Seeds& seeds,
-                                 const CompatibilityOptions& options);
+                                 const CompatibilitySettings& options);
 
 }  // namespace gpureg::cuda

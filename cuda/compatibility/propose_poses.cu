@@ -92,7 +92,7 @@ __global__ void __launch_bounds__(kThreads)
 
 /// Counts the matches that each candidate aligns.
 void add_matches(Exec& exec, const MatchSets& matches, Candidates& candidates,
-                 const RegistrationOptions& options) {
+                 const RegistrationSettings& options) {
   const std::size_t pairs = matches.room.entries();
   const std::uint32_t largest = matches.room.largest,
                       candidate_blocks = blocks_for(std::min(candidates.most, largest), kThreads),
@@ -136,7 +136,7 @@ Candidates candidates_of(Exec& exec, std::size_t pairs, std::uint32_t most) {
 }  // namespace
 
 Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds,
-                         const RegistrationOptions& options) {
+                         const RegistrationSettings& options) {
   const std::size_t pairs = matches.room.entries();
   Candidates out = candidates_of(exec, pairs, seeds.most);
   if (matches.room.largest == 0) return out;
@@ -149,7 +149,7 @@ Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seed
 }
 
 Candidates candidates_from_modes(Exec& exec, const MatchSets& matches, const Modes& modes,
-                                 const RegistrationOptions& options) {
+                                 const RegistrationSettings& options) {
   const std::size_t pairs = matches.room.entries();
   Candidates out = candidates_of(exec, pairs, modes.most);
   if (matches.room.largest == 0) return out;

@@ -268,7 +268,7 @@ __global__ void __launch_bounds__(32)
 }
 
 void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes, std::uint32_t max_iterations,
-                const RegistrationOptions& options, float kernel_width, double settled) {
+                const RegistrationSettings& options, float kernel_width, double settled) {
   RefineModes batch{};
   batch.pairs = pairs.pairs.data();
   batch.most = modes.most;
@@ -297,7 +297,7 @@ void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes, std::uint32
 }  // namespace
 
 void refine_roughly(Exec& exec, Span<const PairView> pairs, Modes& modes,
-                    const RegistrationOptions& options) {
+                    const RegistrationSettings& options) {
   if (options.refine.max_iterations == 0) return;
   refine_all(exec, sample_pairs(exec, pairs, refinement_sample(options.evidence), false), modes,
              std::min(kRoughIterations, options.refine.max_iterations), options,
@@ -305,7 +305,7 @@ void refine_roughly(Exec& exec, Span<const PairView> pairs, Modes& modes,
 }
 
 void polish_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
-                  const RegistrationOptions& options) {
+                  const RegistrationSettings& options) {
   if (options.refine.max_iterations == 0) return;
   const float kernel_width = kPolishKernel * options.refine.kernel_width;
   refine_all(exec, sample_pairs(exec, pairs, refinement_sample(options.evidence), false), modes,
@@ -315,7 +315,7 @@ void polish_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
              kPolishSettled);
 }
 
-void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options, float share) {
+void merge_modes(Exec& exec, Modes& modes, const RegistrationSettings& options, float share) {
   const unsigned pairs = static_cast<unsigned>(modes.count.size());
   launch(exec, "merge", merge, {pairs, 32}, modes.most, modes.mode.data(), modes.count.data(),
          mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, share));

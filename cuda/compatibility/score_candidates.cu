@@ -97,7 +97,7 @@ __global__ void __launch_bounds__(32 * std::max(kEach, kWarps), kEach > 1 ? 4 : 
 }  // namespace
 
 void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
-                      Candidates& candidates, const RegistrationOptions& options) {
+                      Candidates& candidates, const RegistrationSettings& options) {
   const std::uint32_t most = std::min(candidates.most, matches.room.largest);
   if (most == 0) return;
   const SampledPairs sampled = sample_pairs(exec, pairs, options.evidence.sample, true);

@@ -223,7 +223,7 @@ __global__ void __launch_bounds__(kThreads, kBlocks) verify_both(VerifyModes w) 
 
 void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
                   const Candidates& candidates, const Modes& modes,
-                  const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+                  const RegistrationSettings& options, Span<PairOutcome> outcomes) {
   const auto views = upload_search_pairs(exec, pairs);
   // Filled: unused modes are copied too, and parts are added up.
   const auto verified = exec.filled<ModeOutcome>(pairs.size * modes.most, 0);

@@ -134,7 +134,8 @@ std::vector<float> CudaCloud::copy_features() const {
 std::vector<std::shared_ptr<CudaCloud>> assemble(
     Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
     const Features& features, const Features& wide_features, const ClosestGrids& closest,
-    const DepthMaps& depth_maps, const SurfaceSides& surface_sides, const PrepareOptions& options) {
+    const DepthMaps& depth_maps, const SurfaceSides& surface_sides,
+    const PrepareSettings& options) {
   const Segments& segments = clouds.segments;
   const std::size_t clouds_count = segments.entries();
   const auto counts = exec.filled<Counts>(clouds_count, 0);

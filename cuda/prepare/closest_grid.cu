@@ -51,7 +51,7 @@ __global__ void write_blocks(const std::uint32_t* block_offset, BlockOfCorner bl
 }  // namespace
 
 ClosestGrids build_closest_grids(Exec& exec, const DownsampledClouds& clouds, const Grids& grids,
-                                 const PrepareOptions& options) {
+                                 const PrepareSettings& options) {
   const Segments& points = clouds.segments;
   const std::size_t count = points.entries();
   ClosestGrids out;

@@ -239,7 +239,7 @@ __global__ void __launch_bounds__(kThreads) write_candidates(Lists l) {
 }  // namespace
 
 void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids& grids,
-                        const ClosestGeometry* geometry, const PrepareOptions& options,
+                        const ClosestGeometry* geometry, const PrepareSettings& options,
                         ClosestGrids& out) {
   const std::size_t count = clouds.segments.entries();
   const std::uint32_t blocks = out.blocks.total();

@@ -50,7 +50,7 @@ __global__ void erode_maps(MapBatch m) {
 }  // namespace
 
 DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const DownsampledClouds& clouds,
-                           const PrepareOptions& options) {
+                           const PrepareSettings& options) {
   const std::size_t entries = clouds.segments.entries();
   DepthMaps out;
   std::vector<Vec3> viewpoints;

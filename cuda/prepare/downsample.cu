@@ -116,7 +116,7 @@ DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
   return device;
 }
 
-CloudFacts facts_of(const RawCloud& raw, const Extent& extent, const PrepareOptions& options) {
+CloudFacts facts_of(const RawCloud& raw, const Extent& extent, const PrepareSettings& options) {
   CloudFacts facts;
   facts.input_points = raw.size;
   facts.invalid_points = raw.size - extent.finite;
@@ -162,7 +162,7 @@ CellRange voxel_range(const CloudFacts& facts, std::size_t raw_size, float voxel
 }  // namespace
 
 DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds,
-                             const PrepareOptions& options) {
+                             const PrepareSettings& options) {
   constexpr unsigned kThreads = 256;
   std::vector<RawSlot> slots;
   auto raw_data = upload_raw(exec, clouds, slots);

@@ -182,7 +182,7 @@ void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& no
 }  // namespace
 
 Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
-                          const Grids& grids, const PrepareOptions& options) {
+                          const Grids& grids, const PrepareSettings& options) {
   const Segments& segments = clouds.segments;
   const std::size_t count = segments.entries();
   Features out;
@@ -220,7 +220,7 @@ Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuf
 }
 
 Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const Grids& grids,
-                               const PrepareOptions& options) {
+                               const PrepareSettings& options) {
   const Segments& segments = clouds.segments;
   Features out;
   std::vector<std::uint8_t> custom;

@@ -67,7 +67,7 @@ __global__ void measure_density(const std::uint32_t* offset, const std::uint32_t
 
 }  // namespace
 
-Grids build_grids(Exec& exec, const DownsampledClouds& clouds, const PrepareOptions& options) {
+Grids build_grids(Exec& exec, const DownsampledClouds& clouds, const PrepareSettings& options) {
   constexpr unsigned kThreads = 256;
   const Segments& segments = clouds.segments;
   const std::size_t count = segments.entries();

@@ -48,7 +48,8 @@ __global__ void march(SurfaceSideBatch f) {
 }  // namespace
 
 SurfaceSides build_surface_sides(Exec& exec, const DownsampledClouds& clouds,
-                                 const DeviceBuffer<Vec3>& normals, const PrepareOptions& options) {
+                                 const DeviceBuffer<Vec3>& normals,
+                                 const PrepareSettings& options) {
   SurfaceSides out;
   out.offset.push_back(0);
   const std::size_t entries = clouds.segments.entries();

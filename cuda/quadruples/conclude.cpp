@@ -8,7 +8,7 @@ namespace gpureg::cuda {
 void conclude(Exec& exec, Span<const PairView> pairs, const Matches& matches,
               const Quadruples& quadruples, const Hypotheses& hypotheses,
               const DeviceBuffer<BestPose>& poses, const DeviceBuffer<Verification>& verifications,
-              const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+              const RegistrationSettings& options, Span<PairOutcome> outcomes) {
   const std::uint32_t* match_count =
       exec.download(matches.count.data() + quadruples.first_pair, pairs.size);
   const std::uint32_t* hypothesis_count = exec.download(hypotheses.count.data(), pairs.size);

@@ -43,7 +43,7 @@ __global__ void __launch_bounds__(128)
 }  // namespace
 
 Hypotheses fit_hypotheses(Exec& exec, const Matches& matches, const Quadruples& quadruples,
-                          const RegistrationOptions& options) {
+                          const RegistrationSettings& options) {
   const std::uint32_t total = quadruples.segments.total();
   const std::uint32_t pairs = static_cast<std::uint32_t>(quadruples.segments.entries());
   Hypotheses out;

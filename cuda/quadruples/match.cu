@@ -73,7 +73,8 @@ __global__ void __launch_bounds__(kTile) collect_matches(MatchBatch m) {
 
 }  // namespace
 
-Matches match_features(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options) {
+Matches match_features(Exec& exec, Span<const PairView> pairs,
+                       const RegistrationSettings& options) {
   const std::uint32_t k = options.quadruples.neighbors;
   const auto asks = [&](std::size_t p) {
     return pairs[p].custom_count == 0 && pairs[p].source.size > 0 && pairs[p].target.size > 0;

@@ -101,7 +101,7 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
 
 DeviceBuffer<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
                                     const DeviceBuffer<BestPose>& best,
-                                    const RegistrationOptions& options) {
+                                    const RegistrationSettings& options) {
   auto out = exec.buffer<BestPose>(pairs.size);
   if (options.refine.max_iterations == 0) {
     check(cudaMemcpyAsync(out.data(), best.data(), pairs.size * sizeof(BestPose),

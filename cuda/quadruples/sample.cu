@@ -211,7 +211,7 @@ __global__ void __launch_bounds__(kWordsPerChunk)
 
 }  // namespace
 
-Samples sample_quadruples(Exec& exec, const Matches& matches, const RegistrationOptions& options) {
+Samples sample_quadruples(Exec& exec, const Matches& matches, const RegistrationSettings& options) {
   const std::size_t pairs = matches.room.entries();
   const std::uint32_t chunks = blocks_for(options.quadruples.count, 32 * kWordsPerChunk);
   const std::size_t all_chunks = pairs * chunks;

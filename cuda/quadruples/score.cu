@@ -125,7 +125,8 @@ __global__ void __launch_bounds__(kThreads, 1)
   }
 }
 
-std::vector<ScorePair> score_pairs(Span<const PairView> pairs, const RegistrationOptions& options) {
+std::vector<ScorePair> score_pairs(Span<const PairView> pairs,
+                                   const RegistrationSettings& options) {
   std::vector<ScorePair> out;
   for (const PairView& pair : pairs) {
     const auto& source = *static_cast<const CudaCloud*>(pair.source.executor_data);
@@ -140,7 +141,7 @@ std::vector<ScorePair> score_pairs(Span<const PairView> pairs, const Registratio
   return out;
 }
 
-std::vector<Limits> limit_tables(const RegistrationOptions& options) {
+std::vector<Limits> limit_tables(const RegistrationSettings& options) {
   std::vector<Limits> out;
   for (const bool exact : {true, false}) {
     const SummaryLimits limits(options.quadruples.max_normal_angle, exact);
@@ -168,7 +169,7 @@ std::vector<Slice> cut_slices(const Segments& segments, unsigned multiprocessors
 
 DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
                                         const Hypotheses& hypotheses,
-                                        const RegistrationOptions& options) {
+                                        const RegistrationSettings& options) {
   const std::uint32_t total = hypotheses.segments->total();
   const std::uint32_t count = static_cast<std::uint32_t>(pairs.size);
   const std::vector<ScorePair> host_pairs = score_pairs(pairs, options);

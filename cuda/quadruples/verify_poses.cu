@@ -79,7 +79,7 @@ __global__ void __launch_bounds__(kThreads)
 
 DeviceBuffer<Verification> verify_poses(Exec& exec, Span<const PairView> pairs,
                                         const DeviceBuffer<BestPose>& poses,
-                                        const RegistrationOptions& options) {
+                                        const RegistrationSettings& options) {
   auto out = exec.filled<Verification>(pairs.size, 0);
   const auto views = upload_search_pairs(exec, pairs);
   // Few pairs: more thread blocks for each.

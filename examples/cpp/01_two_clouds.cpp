@@ -19,7 +19,7 @@ int main(int argc, char** argv) try {
   // The GPU where there is one, else all cores of the CPU. The result is the same.
   const gpureg::Context context = gpureg::Context::best();
   // Metres. Every other length follows from the voxel size.
-  const auto options = gpureg::RegistrationOptions::from_voxel_size(0.05f);
+  const gpureg::RegistrationOptions options{0.05f};
 
   const auto result = gpureg::align(context, source.view(), target.view(), options);
   std::cout << context.description() << ": " << explain(result.reason) << "\n"

@@ -24,9 +24,9 @@ int main(int argc, char** argv) try {
   for (const gpureg::PointCloud& cloud : clouds) views.push_back(cloud.view());
 
   const gpureg::Context context = gpureg::Context::best();
-  const auto options = gpureg::RegistrationOptions::from_voxel_size(0.05f);
+  const gpureg::RegistrationOptions options{0.05f};
   // Errors name the file that they are about.
-  const auto prepared = gpureg::prepare_batch(context, views, options.prepare, files);
+  const auto prepared = gpureg::prepare_batch(context, views, options, files);
 
   std::vector<gpureg::Pair> pairs;
   for (std::uint32_t target = 0; target < prepared.size(); ++target)

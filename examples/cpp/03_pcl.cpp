@@ -21,7 +21,7 @@ int main(int argc, char** argv) try {
     return pcl::make_shared<Cloud>(gpureg::to_pcl<pcl::PointXYZ>(cloud.view()));
   };
   const Cloud::Ptr source = read(argv[1]), target = read(argv[2]);
-  const auto options = gpureg::RegistrationOptions::from_voxel_size(0.05f);
+  const gpureg::RegistrationOptions options{0.05f};
 
   // The functions of gpureg on views of the clouds. sensor_origin_ becomes the viewpoint.
   const auto result = gpureg::align(gpureg::Context::best(), gpureg::view_of(*source),

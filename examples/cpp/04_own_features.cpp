@@ -41,12 +41,12 @@ int main(int argc, char** argv) try {
     return 2;
   }
   const gpureg::Context context = gpureg::Context::best();
-  auto options = gpureg::RegistrationOptions::from_voxel_size(kVoxel);
+  gpureg::RegistrationOptions options{kVoxel};
 
   const auto prepare = [&](const char* file) {
     // gpureg downsamples and estimates normals ...
     const gpureg::PointCloud cloud = gpureg::io::read_point_cloud(file);
-    const auto plain = gpureg::prepare(context, cloud.view(), options.prepare);
+    const auto plain = gpureg::prepare(context, cloud.view(), options);
     const auto points = plain.points(), normals = plain.normals();
     const auto features = spin_images(points, normals);
     // ... and takes these points again, as they are, with their features.
@@ -54,8 +54,8 @@ int main(int argc, char** argv) try {
     view.normals = normals.front().data();
     view.features = features.data();
     view.feature_dimension = kDimension;
-    auto as_they_are = options.prepare;
-    as_they_are.voxel_size = 0;
+    auto as_they_are = options;
+    as_they_are.prepare.downsample = false;
     return gpureg::prepare(context, view, as_they_are);
   };
   const auto source = prepare(argv[1]), target = prepare(argv[2]);

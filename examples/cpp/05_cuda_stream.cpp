@@ -21,7 +21,7 @@ int main(int argc, char** argv) try {
     return 2;
   }
   const gpureg::Context context = gpureg::Context::cuda();  // throws where there is no usable GPU
-  const auto options = gpureg::RegistrationOptions::from_voxel_size(0.05f);
+  const gpureg::RegistrationOptions options{0.05f};
   cudaStream_t stream = nullptr;
   check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
 
@@ -36,7 +36,7 @@ int main(int argc, char** argv) try {
     gpureg::DevicePointCloudView view;
     view.points = static_cast<const float*>(points);
     view.size = cloud.points.size();
-    auto prepared = gpureg::prepare_async(context, view, options.prepare, stream);
+    auto prepared = gpureg::prepare_async(context, view, options, stream);
     // The rows are read before this frees them: it is enqueued later in the same stream.
     check(cudaFreeAsync(points, stream));
     return prepared;

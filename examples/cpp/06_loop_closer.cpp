@@ -22,7 +22,7 @@ int main(int argc, char** argv) try {
   }
   std::ifstream tracked(argv[1]);
   const gpureg::Context context = gpureg::Context::best();
-  const lc::Options options = lc::Options::from_voxel_size(0.05f);
+  const lc::Options options{gpureg::RegistrationOptions{0.05f}};
   lc::LoopCloser closer(context, options);
 
   gpureg::UnalignedIsometry3d last;
@@ -34,7 +34,7 @@ int main(int argc, char** argv) try {
     for (int cell = 0; cell < 16; ++cell) tracked >> pose.matrix()(cell / 4, cell % 4);
     if (!tracked) throw gpureg::IoError(std::string(argv[1]) + " has too few poses");
     const gpureg::PointCloud cloud = gpureg::io::read_point_cloud(argv[k + 2]);
-    fragment.cloud = gpureg::prepare(context, cloud.view(), options.registration.prepare);
+    fragment.cloud = gpureg::prepare(context, cloud.view(), options.registration);
     fragment.world_from_fragment = pose;
     closer.add(fragment);
     if (k > 0) closer.add_odometry(k, k - 1, last.inverse() * pose);

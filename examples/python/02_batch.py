@@ -23,7 +23,7 @@ def main() -> None:
     parser.add_argument("--quality", type=int, default=5)
     arguments = parser.parse_args()
 
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size, arguments.quality)
+    options = gpureg.RegistrationOptions(voxel_size=arguments.voxel_size, quality=arguments.quality)
     run = gpureg.register_all(arguments.folder, output=arguments.output, options=options)
     print(run)
     best = run.table().sort_by([("score", "descending")]).slice(0, 5)

@@ -41,10 +41,10 @@ def main() -> None:
     network = torch.nn.Sequential(
         torch.nn.Linear(24, 64), torch.nn.ReLU(), torch.nn.Linear(64, 32)
     ).to(device)
-    options = gpureg.RegistrationOptions.from_voxel_size(0.05)
-    options.prepare.voxel_size = 0.0  # the network has chosen the points
+    options = gpureg.RegistrationOptions(voxel_size=0.05)
+    options.prepare.downsample = False  # the network has chosen the points
     clouds = [
-        gpureg.prepare(points, features=features_of(points, network), options=options.prepare)
+        gpureg.prepare(points, features=features_of(points, network), options=options)
         for points in (source, target)
     ]
     result = gpureg.align(clouds[0], clouds[1], options=options)

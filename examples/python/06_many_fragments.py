@@ -34,8 +34,8 @@ def main() -> None:
     parser.add_argument("--quality", type=int, default=5)
     arguments = parser.parse_args()
 
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size, arguments.quality)
-    nearest = pruning.Nearest(k=arguments.neighbors, options=options.prepare)
+    options = gpureg.RegistrationOptions(voxel_size=arguments.voxel_size, quality=arguments.quality)
+    nearest = pruning.Nearest(k=arguments.neighbors, options=options)
     fragments = gpureg.FragmentSet.from_directory(arguments.folder)
 
     # A part of the set, completely: its aligned pairs are what pruning should keep.

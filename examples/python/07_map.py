@@ -20,7 +20,7 @@ def main() -> None:
     parser.add_argument("--voxel-size", type=float, default=0.05)
     arguments = parser.parse_args()
 
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size)
+    options = gpureg.RegistrationOptions(voxel_size=arguments.voxel_size)
     scene = gpureg.reconstruct(arguments.folder, options=options, progress=True)
     for k, island in enumerate(scene.islands):
         print(f"island {k}: scans {island}")

@@ -60,7 +60,7 @@ def main() -> int:
         cloud = gpureg.prepare(
             np.concatenate(points),
             viewpoints=np.array(sensors),
-            options=gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size).prepare,
+            options=gpureg.RegistrationOptions(voxel_size=arguments.voxel_size),
         )
         closer.add(here, cloud, world_from_fragments[-1], time=float(number))
         if here > 0:

@@ -22,10 +22,10 @@ def main() -> None:
     parser.add_argument("--save-map")
     arguments = parser.parse_args()
 
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size)
+    options = gpureg.RegistrationOptions(voxel_size=arguments.voxel_size)
     scene = gpureg.reconstruct(arguments.earlier, options=options)
     map = gpureg.prepare_map(  # of the largest island
-        arguments.earlier, scene, options=gpureg.MapOptions.from_voxel_size(arguments.voxel_size)
+        arguments.earlier, scene, options=gpureg.MapOptions(voxel_size=arguments.voxel_size)
     )
     if arguments.save_map:
         map.save(arguments.save_map)  # gpureg.load_map() reads it

@@ -91,7 +91,8 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, default=Path("poses.txt"))
     arguments = parser.parse_args()
 
-    options = gpureg.LoopClosureOptions.from_voxel_size(arguments.voxel_size)
+    registration = gpureg.RegistrationOptions(voxel_size=arguments.voxel_size)
+    options = gpureg.LoopClosureOptions(registration=registration)
     options.optimize = False  # iSAM2 does
     closer = gpureg.LoopCloser(options=options)
     isam = Isam2()
@@ -104,7 +105,7 @@ def main() -> int:
         parser.error(f"{len(files)} fragments, but {len(odometry)} rows of odometry")
     for here, (file, world_from_fragment) in enumerate(zip(files, odometry, strict=True)):
         points = gpureg.read_point_cloud(file).points
-        cloud = gpureg.prepare(points, options=options.registration.prepare)
+        cloud = gpureg.prepare(points, options=options.registration)
         closer.add(here, cloud, world_from_fragment, time=float(here))
         if here == 0:
             isam.start(here, world_from_fragment)

@@ -36,7 +36,7 @@ def main() -> int:
         downsampling_resolution=voxel / 2,
         max_correspondence_distance=voxel,
     ).T_target_source
-    options = gpureg.RegistrationOptions.from_voxel_size(voxel)
+    options = gpureg.RegistrationOptions(voxel_size=voxel)
     (checked,) = gpureg.verify(source, target, refined, options=options)
     print(f"refined, confidence {checked.confidence:.3f}\n{refined}")
     return 0

@@ -23,11 +23,9 @@ def main() -> int:
     parser.add_argument("-o", "--output", default="poses.json")
     arguments = parser.parse_args()
 
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size)
+    options = gpureg.RegistrationOptions(voxel_size=arguments.voxel_size)
     files = sorted(Path(arguments.folder).glob("*.ply"), key=lambda p: (len(p.name), p.name))
-    clouds = gpureg.prepare_batch(
-        list(map(gpureg.read_point_cloud, files)), options=options.prepare
-    )
+    clouds = gpureg.prepare_batch(list(map(gpureg.read_point_cloud, files)), options=options)
     pairs = [(j, i) for j in range(len(files)) for i in range(j)]  # source, target
     found = dict(zip(pairs, gpureg.align_batch(clouds, pairs, options=options)))
     aligned = {pair: result for pair, result in found.items() if result.aligned}

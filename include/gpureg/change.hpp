@@ -20,23 +20,19 @@ enum class ChangeLabel : std::uint8_t {
 /// "same", "new", "gone", "occluded", "not_observed".
 const char* to_string(ChangeLabel label);
 
-/// Options of find_changes(). The lengths are for voxels of 5 cm.
+/// Options of find_changes(). Lengths are in voxels of the map.
 struct ChangeOptions {
-  /// Surfaces closer together than this are the same, metres, > 0.
-  double tolerance = 0.05;
+  /// Surfaces closer together than this are the same, > 0.
+  double tolerance = 1;
   /// Uncertainty of the pose, one standard deviation: twice what it moves a point by is added to
-  /// the tolerance there. Metres and degrees, >= 0.
-  double translation_sigma = 0.005, rotation_sigma = 0.1;
-  /// Changes of a smaller extent are taken for noise, metres, >= 0.
-  double min_extent = 0.1;
+  /// the tolerance there. Voxels and degrees, >= 0.
+  double translation_sigma = 0.1, rotation_sigma = 0.1;
+  /// Changes of a smaller extent are taken for noise, >= 0.
+  double min_extent = 2;
   /// Sensor positions of each cloud whose free space is compared, spread evenly, 1..4096.
   std::uint32_t viewpoints = 64;
   /// Refine the pose by ICP first.
   bool refine = true;
-
-  /// Every length from the voxel size.
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static ChangeOptions from_voxel_size(float voxel_size);
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;
@@ -70,10 +66,7 @@ struct ChangeResult {
 ///   scan that looks as if it was in another unit. Thread-safe.
 ChangeResult find_changes(const Context& context, const PointCloudView& scan,
                           const PreparedMap& map, const UnalignedIsometry3d& map_from_scan,
-                          const ChangeOptions& options);
-/// The same with the options of the map's voxel size.
-ChangeResult find_changes(const Context& context, const PointCloudView& scan,
-                          const PreparedMap& map, const UnalignedIsometry3d& map_from_scan);
+                          const ChangeOptions& options = {});
 
 /// Writes a cloud as a binary PLY with red, green, blue and label (of ChangeLabel) as bytes and the
 /// probability as float: same grey, new green, gone red, occluded blue, not observed light grey.

@@ -71,7 +71,7 @@ struct DevicePointCloudView {
 ///   a context of another backend.
 /// @throws DeviceError if the device has no memory.
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
-                                         const PrepareOptions& options, CudaStream stream);
+                                         const RegistrationOptions& options, CudaStream stream);
 
 /// prepare_batch() for clouds in device memory: prepare_async() with one thread for all clouds,
 /// which are prepared together. Thread-safe.
@@ -83,14 +83,14 @@ std::future<PreparedCloud> prepare_async(const Context& context, const DevicePoi
 /// @throws DeviceError if the device has no memory.
 std::future<std::vector<PreparedCloud>> prepare_batch_async(
     const Context& context, const std::vector<DevicePointCloudView>& clouds,
-    const PrepareOptions& options, const std::vector<CudaStream>& streams,
+    const RegistrationOptions& options, const std::vector<CudaStream>& streams,
     const std::vector<std::string>& names = {});
 
 /// prepare_async() that waits for the result.
 /// @throws InvalidArgument as prepare_async() does.
 /// @throws DeviceError as its future does.
 inline PreparedCloud prepare(const Context& context, const DevicePointCloudView& cloud,
-                             const PrepareOptions& options, CudaStream stream) {
+                             const RegistrationOptions& options, CudaStream stream) {
   return prepare_async(context, cloud, options, stream).get();
 }
 

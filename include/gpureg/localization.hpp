@@ -16,19 +16,14 @@
 /// deterministic and thread-safe unless it says otherwise.
 namespace gpureg::localization {
 
-/// Options of a map. The lengths are for voxels of 5 cm.
+/// Options of a map. Lengths are in voxels.
 struct MapOptions {
-  /// Of the map's tiles and of the scans; voxel_size > 0.
-  PrepareOptions prepare;
-  /// Largest edge of a tile, metres, > 0. A scan is aligned with every tile.
-  double tile_size = 20;
-  /// A tile also has the points of its neighbours within this distance, metres, >= 0: about half of
-  /// the extent of a scan.
-  double halo = 4;
-
-  /// Every length from the voxel size.
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static MapOptions from_voxel_size(float voxel_size);
+  float voxel_size = 0.05f;     ///< in the unit of the points, > 0
+  PrepareOptions prepare = {};  ///< of the map's tiles and of the scans
+  double tile_size = 400;       ///< largest edge of a tile, > 0. A scan is aligned with every tile.
+  /// A tile also has the points of its neighbours within this distance, >= 0: about half of the
+  /// extent of a scan.
+  double halo = 80;
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;
@@ -111,18 +106,14 @@ class MapBuilder {
 /// @throws InvalidArgument as MapBuilder.
 PreparedMap prepare_map(const PointCloudView& cloud, const MapOptions& options = {});
 
-/// Options of locate(). The lengths are for voxels of 5 cm.
+/// Options of locate(). Lengths are in voxels of the map.
 struct LocateOptions {
-  /// Of the alignments; registration.prepare has to have the voxel size of the map. Its
-  /// min_confidence is not used, and a calibration is refused: both are of pairs.
-  RegistrationOptions registration;
+  /// Of the alignments, with the voxel size of the map. Its min_confidence is not used, and a
+  /// calibration is refused: both are of pairs.
+  RegistrationOptions registration = {};
   /// Confidence from which a place is found. It is higher than that of pairs: a map offers many
   /// places to a scan that is not in it.
   double min_confidence = 0.75;
-  /// Matches of a scan and a tile, in place of compatibility.max_matches, 4..65536: a tile has many
-  /// more matches of its own than the scan has, and a random choice of few holds hardly any of the
-  /// scan's.
-  std::uint32_t max_matches = 65536;
   /// If the view from above does not tell the place, all tiles are searched with voxels this
   /// many times as wide as those of the map, 1..8: several times as fast, and thinned scans of
   /// spinning LiDARs find more. 1: with those of the map.
@@ -138,12 +129,8 @@ struct LocateOptions {
   std::uint32_t fine_tiles = 4;
   /// Poses of a scan that are verified against all of the map around them, 1..64.
   std::uint32_t candidates = 8;
-  /// Distance from the points of the scan up to which the map takes part in this, metres, > 0.
-  double neighborhood = 0.5;
-
-  /// Every length from the voxel size.
-  /// @throws InvalidArgument as RegistrationOptions::from_voxel_size().
-  static LocateOptions from_voxel_size(float voxel_size, std::uint32_t quality = kDefaultQuality);
+  /// Distance from the points of the scan up to which the map takes part in this, > 0.
+  double neighborhood = 10;
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

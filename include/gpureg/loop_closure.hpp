@@ -41,18 +41,18 @@ struct Fragment {
   std::optional<Eigen::Vector3d> up = std::nullopt;
 };
 
-/// Which pairs of fragments are registered without being asked for.
+/// Which pairs of fragments are registered without being asked for. Lengths are in voxels.
 struct ProposalOptions {
-  /// Edge of the coarse voxels that say what a fragment observed, metres, > 0: ten voxels.
-  double coarse_voxel_size = 0.5;
+  /// Edge of the coarse voxels that say what a fragment observed, > 0.
+  double coarse_voxel_size = 10;
   /// Smallest expected overlap: the share of the coarse voxels of one fragment that the other
   /// observed, within the uncertainty of their relative pose, (0, 1].
   double min_overlap = 0.2;
-  /// Largest distance by which the uncertainty may widen the search, metres, >= 0.
-  double max_dilation = 3;
+  /// Largest distance by which the uncertainty may widen the search, >= 0.
+  double max_dilation = 60;
   /// Pairs whose relative pose the graph knows better than this are not proposed: standard
-  /// deviation of the translation, metres, >= 0.
-  double min_uncertainty = 0.03;
+  /// deviation of the translation, >= 0.
+  double min_uncertainty = 0.6;
   /// Pairs of one session closer in time are not proposed, seconds, >= 0.
   double min_time = 0;
   std::uint32_t per_fragment = 6;          ///< with earlier fragments of its frame
@@ -91,22 +91,23 @@ struct AcceptanceOptions {
   void validate() const;
 };
 
-/// Options of a LoopCloser. The lengths are for voxels of 5 cm.
+/// Options of a LoopCloser. Lengths are in voxels of the registration, but for those of `graph`.
 struct Options {
-  RegistrationOptions registration;
-  ProposalOptions proposals;
-  AcceptanceOptions acceptance;
-  reconstruction::EdgeNoiseOptions noise;  ///< of registered poses
-  /// Length in which PoseEvidence::information_eigenvalues count rotations, metres, > 0: twenty
-  /// voxels.
-  double information_unit = 1.0;
-  /// Graph optimisation: robust kernel, drift of odometry without covariance, noise of host loops
-  /// without information. By the drift pairs are proposed and loops verified. The poses start from
-  /// it: the accepted loops show how noisy odometry and loops are.
-  pose_graph::Options graph;
-  /// Distance over which errors of odometry without covariance have one sign, metres, >= 0: biases
+  RegistrationOptions registration = {};  ///< with the voxel size of the fragments
+  ProposalOptions proposals = {};
+  AcceptanceOptions acceptance = {};
+  reconstruction::EdgeNoiseOptions noise = {};  ///< of registered poses
+  /// Of loops of the host without information, in place of graph.loop_noise.
+  pose_graph::LoopNoiseOptions host_noise = {1, 1};
+  /// Length in which PoseEvidence::information_eigenvalues count rotations, > 0.
+  double information_unit = 20;
+  /// Graph optimisation: robust kernel, drift of odometry without covariance. By the drift pairs
+  /// are proposed and loops verified. The poses start from it: the accepted loops show how noisy
+  /// odometry and loops are.
+  pose_graph::Options graph = {};
+  /// Distance over which errors of odometry without covariance have one sign, >= 0: biases
   /// make drift grow faster than independent errors would. 0: independent errors.
-  double drift_correlation = 10;
+  double drift_correlation = 200;
   /// Standard deviation of Fragment::up in the graph, degrees in (1e-6, 180]; 0: not used in the
   /// graph, and the world need not be z-up.
   double gravity_sigma = 0;
@@ -115,13 +116,9 @@ struct Options {
   /// false: poses are left to the host (Update::poses is empty); states of loops are the same.
   bool optimize = true;
 
-  /// Every length from the voxel size of the fragments.
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static Options from_voxel_size(float voxel_size);
-
   /// Verification by the constants of LoopSmart: pose_graph::Options::loopsmart(), information of
   /// loops from their correspondences, one mode per pair, no rule but the line process. See there
-  /// for the drift that it tolerates. The lengths are those of from_voxel_size().
+  /// for the drift that it tolerates.
   static Options loopsmart(float voxel_size = 0.05f);
 
   /// true: Loop::information is the sum of G'G over correspondences (LoopSmart's equation of f);
@@ -268,7 +265,7 @@ class LoopCloser {
                const std::optional<RegistrationPrior>& prior = std::nullopt);
 
   /// A loop that the host found: images, GNSS, tags.
-  /// @param information as Loop::information; none: Options::graph.loop_noise.
+  /// @param information as Loop::information; none: Options::host_noise.
   /// @param confidence prior probability that it is correct, [0, 1].
   /// @throws InvalidArgument as add_odometry(), and for a confidence outside [0, 1].
   void add_loop(FragmentId source, FragmentId target, const UnalignedIsometry3d& target_from_source,

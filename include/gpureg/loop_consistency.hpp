@@ -10,13 +10,12 @@
 /// compose to the identity.
 namespace gpureg {
 
-/// Model of closing errors. The defaults are for voxels of 5 cm; the tolerance grows with the
-/// voxel.
+/// Model of closing errors.
 struct LoopConsistencyOptions {
+  float voxel_size = 0.05f;  ///< of the clouds, in the unit of the points
   /// Standard deviation of the rotation error of a loop of three correct poses, degrees.
   float closing_angle = 3.0f;
-  /// Standard deviation of its translation error, metres.
-  float closing_distance = 0.15f;
+  float closing_distance = 3;  ///< standard deviation of its translation error, voxels
   /// Probability that a loop with a false pose closes all the same: near misses, and perceptual
   /// aliases, whose false poses close loops with correct ones. Measured: 0 to 0.33 in seven scenes;
   /// loops also share pairs.
@@ -35,10 +34,6 @@ struct LoopConsistencyOptions {
   std::uint32_t neighbors = 64;
   std::uint32_t iterations = 3;  ///< damped updates, 1..100
   int threads = 0;               ///< 0: one per core. Results do not depend on it.
-
-  /// closing_distance of three voxels; the rest does not depend on the voxel.
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static LoopConsistencyOptions from_voxel_size(float voxel_size);
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

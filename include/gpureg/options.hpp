@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 namespace gpureg {
 
@@ -16,23 +17,23 @@ enum class RegistrationMethod : std::uint8_t {
 
 const char* to_string(RegistrationMethod method);
 
-/// How a raw cloud becomes a PreparedCloud. All lengths in metres (or the unit of the points).
+/// How a raw cloud becomes a PreparedCloud. Lengths are in voxels: multiples of
+/// RegistrationOptions::voxel_size.
 struct PrepareOptions {
-  /// Edge of the downsampling voxel, one centroid each (paper: 0.05); 0: keep the points as they
-  /// are.
-  float voxel_size = 0.05f;
-  /// Neighbourhood of the normal's PCA (paper: 0.1). The wide FPFH is computed from normals of a
+  /// One centroid per voxel; false: keep the points as they are.
+  bool downsample = true;
+  /// Neighbourhood of the normal's PCA (paper: 2). The wide FPFH is computed from normals of a
   /// radius that is larger by wide_feature_radius / feature_radius, at most 4 feature_radius.
-  float normal_radius = 0.1f;
-  float feature_radius = 0.25f;  ///< neighbourhood of FPFH, also of its SPFH (paper: 0.25)
+  float normal_radius = 2;
+  float feature_radius = 5;  ///< neighbourhood of FPFH, also of its SPFH (paper: 5)
   /// Neighbourhood of a second FPFH, matched beside the first (only if the features are FPFH);
   /// 0: none (paper: none). Wide features find matches on floors and walls, where small
   /// neighbourhoods look alike.
-  float wide_feature_radius = 0.4f;
-  /// Largest distance of an inlier and of a correspondence of the refinement (paper: 0.075). It
-  /// sets the cell size of the closest-point grid, so clouds are prepared with it. An alignment may
-  /// use a smaller one than its clouds were prepared with, never a larger one.
-  float max_correspondence_distance = 0.075f;
+  float wide_feature_radius = 8;
+  /// Largest distance of an inlier and of a correspondence of the refinement (paper: 1.5). It sets
+  /// the cell size of the closest-point grid, so clouds are prepared with it. An alignment may use
+  /// a smaller one than its clouds were prepared with, never a larger one.
+  float max_correspondence_distance = 1.5f;
   /// Number of viewpoints that get a depth map for free-space tests, evenly chosen among the
   /// cloud's; 0: no maps, and given normals are never turned (PointCloudView::viewpoints). A map
   /// takes 110 KB.
@@ -40,98 +41,12 @@ struct PrepareOptions {
   /// Range in front of and behind its surfaces within which a cloud tells the two sides apart, for
   /// the evidence; 0: not at all (paper: 0). Takes half a byte for each cell of a tenth of it in
   /// the cloud's box; a box of more than 2^26 cells gets none.
-  float surface_side_distance = 0.5f;
+  float surface_side_distance = 10;
   /// Keep points at the smallest and the largest range of the sensor: a tank scanned from its
   /// centre has its wall there. Otherwise they are left out, because they are fixed to the sensor
   /// and support no other pose than that at which it did not move
   /// (gpureg/preparation/sensor_fixed.hpp).
   bool keep_range_limits = false;
-
-  /// @throws InvalidArgument naming field and value.
-  void validate() const;
-};
-
-/// Candidate poses from matches that keep each other's distances and angles
-/// (RegistrationMethod::compatibility).
-struct CompatibilityOptions {
-  /// Matches kept per pair, chosen at random if there are more, 4..65536.
-  std::uint32_t max_matches = 4096;
-  std::uint32_t seeds = 512;  ///< matches whose neighbourhoods become candidates, 1..8192
-  /// Compatible matches of a seed that take part, 3..1024.
-  std::uint32_t max_members = 256;
-  /// Triangles tried per seed, each of the seed and two compatible members, 1..4096.
-  std::uint32_t triangles = 32;
-  /// Least-squares fits to the consensus set of the best triangle, 1..8.
-  std::uint32_t refits = 2;
-  /// Metres that the distances of compatible matches may differ by.
-  float tolerance = 0.05f;
-  /// Largest difference of the cosines between their normals, (0, 2]; 2: no test.
-  float max_turn = 0.5f;
-  /// Metres within which a pose brings a match together.
-  float consensus_distance = 0.1f;
-  /// Metres around a seed without a weaker seed; shortest side of a triangle.
-  float seed_separation = 0.1f;
-
-  /// @throws InvalidArgument naming field and value.
-  void validate() const;
-};
-
-/// The paper's hypotheses (RegistrationMethod::quadruples): uniform quadruples of cached feature
-/// matches, scored by their inliers (LoopSmart, Algorithm 1).
-struct QuadrupleOptions {
-  std::uint32_t count = 4'000'000;  ///< quadruples drawn per pair (paper: 4,000,000); at most 2^30
-  /// Nearest features kept per source point, 1..16 (paper: 1).
-  std::uint32_t neighbors = 1;
-  bool mutual = false;  ///< keep only matches that are nearest in both directions
-  /// tau of the polygon test: smallest ratio between corresponding sides, in (0, 1] (paper: 0.9).
-  float edge_similarity = 0.9f;
-  /// Number of quadruples that are scored, the first ones that pass the polygon test, 1..2^22. The
-  /// paper scores all of them: 2^18 does so for real pairs. 4,096 keep recall and precision within
-  /// the difference of two seeds (bench/notes/experiments.md). The quadruples are drawn at random,
-  /// so those that are left out are like those that are scored.
-  std::uint32_t max_survivors = 4096;
-  /// Degrees between the normals of an inlier while hypotheses are compared, (0, 180]; 180: no test
-  /// (CZK: 30).
-  float max_normal_angle = 30.0f;
-  /// The same while the winner is verified. Normals of a coarse cloud turn by tens of degrees at
-  /// edges and in clutter: under 30 degrees a true pose loses about a quarter of its overlap
-  /// (measured at ground-truth poses of 5 cm clouds), a false one gains little.
-  float max_verification_normal_angle = 70.0f;
-  /// Verified inlier ratio below which no alignment is reported, [0, 1] (CZK: 0.33).
-  float min_inlier_ratio = 0.3f;
-
-  /// @throws InvalidArgument naming field and value.
-  void validate() const;
-};
-
-/// Robust point-to-plane ICP that refines the winning hypothesis, or every mode.
-struct RefineOptions {
-  std::uint32_t max_iterations = 16;  ///< 0 switches the refinement off (paper: off)
-  /// Width of the Geman-McClure kernel on the point-to-plane distance, metres.
-  float kernel_width = 0.025f;
-
-  /// @throws InvalidArgument naming field and value.
-  void validate() const;
-};
-
-/// How candidates are scored and verified (RegistrationMethod::compatibility): support by matches,
-/// overlap of both clouds, free space.
-struct EvidenceOptions {
-  /// Approximate number of points of each cloud that score a candidate, 64..65536.
-  std::uint32_t sample = 512;
-  std::uint32_t modes = 24;  ///< distinct poses that are refined and verified by all points, 1..64
-  float max_normal_angle = 30.0f;  ///< degrees between the normals of an inlier
-  /// Two poses are one mode if their rotations differ by less than this, degrees, ...
-  float mode_angle = 11.5f;
-  float mode_distance = 0.3f;  ///< ... and the cloud's centre by less than this, metres.
-  /// Range of the degeneracy search, metres: the most likely mode is perturbed along its weakest
-  /// direction by up to this far, both ways, and refined and verified again. Refinement may stop
-  /// anywhere along a bare wall; the evidence then tells where. A perturbed pose that stays away
-  /// counts as a mode of its own. 0: no search.
-  float degeneracy_search_distance = 0.4f;
-  /// Metres in front of an observed surface within which a point does not violate free space.
-  float free_space_margin = 0.12f;
-  float min_range = 0.3f;  ///< metres from a viewpoint below which nothing counts as observed
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;
@@ -157,51 +72,38 @@ struct ConfidenceCalibration {
 /// The range of `quality`: 0 is the fastest, 10 finds the most.
 inline constexpr std::uint32_t kDefaultQuality = 5, kHighestQuality = 10;
 
-/// All options of one registration. An aggregate with in-class defaults: set only the fields to
-/// change.
-///
-/// Most users set the voxel size and the quality, through from_voxel_size(), then seed and
-/// min_confidence. The options below them are for experts.
+/// All options of one registration. An aggregate with in-class defaults: RegistrationOptions{0.1f}
+/// is for voxels of 10 cm, RegistrationOptions{0.1f, 8} also finds more.
 struct RegistrationOptions {
+  /// Edge of the downsampling voxel, in the unit of the points (paper: 0.05). Every other length
+  /// follows from it.
+  float voxel_size = 0.05f;
+  /// Number of candidate poses, 0 to kHighestQuality: time against recall
+  /// (RegistrationMethod::compatibility).
+  std::uint32_t quality = kDefaultQuality;
   std::uint64_t seed = 1;  ///< same seed, same bits: on any backend, thread count and batch split
-  /// Confidence below which no alignment is reported, [0, 1] (RegistrationMethod::compatibility).
+  /// Confidence below which no alignment is reported, [0, 1]. With RegistrationMethod::quadruples
+  /// it is the verified inlier ratio; loopsmart() sets 0.3 (CZK: 0.33).
   double min_confidence = 0.5;
-  RegistrationMethod method = RegistrationMethod::compatibility;
-  /// Move the cloud with fewer points (Choi et al. 2015). The result refers to the given source and
-  /// target either way.
-  bool smaller_as_source = true;
   /// Report one of several poses that a symmetry of the larger cloud makes equivalent if their
   /// common confidence reaches min_confidence: status aligned_up_to_symmetry. Otherwise such a pair
   /// is not aligned, for the reason symmetric (RegistrationMethod::compatibility).
   bool accept_symmetry = false;
   /// Applied to every confidence (RegistrationMethod::compatibility).
-  ConfidenceCalibration calibration;
-  PrepareOptions prepare;
-  CompatibilityOptions compatibility;
-  QuadrupleOptions quadruples;
-  RefineOptions refine;
-  EvidenceOptions evidence;
+  ConfidenceCalibration calibration = {};
+  RegistrationMethod method = RegistrationMethod::compatibility;
+  /// Quadruples drawn per pair, 1..2^30 (paper: 4,000,000; RegistrationMethod::quadruples).
+  std::uint32_t quadruples = 4'000'000;
+  std::uint32_t refine_iterations = 16;  ///< of ICP at most; 0 switches it off (paper: off)
+  PrepareOptions prepare = {};
+  /// Internal constants by their names, for experiments: "evidence.sample=1024 refine.kernel_width=
+  /// 0.05". src/settings/settings.hpp has them, lengths in the unit of the points. They may change
+  /// with any version.
+  std::string tune = {};
 
-  /// Every length from the voxel size: normals 2 v, FPFH 5 v and 8 v, correspondence distance 1.5
-  /// v, kernel 0.5 v, compatibility 1 v, free-space margin 2.4 v.
-  /// @param voxel_size in the unit of the points, finite and > 0.
-  /// @param quality 0 to 10, sets the number of candidates: compatibility.max_matches, seeds and
-  ///   triangles, evidence.modes.
-  /// @throws InvalidArgument for a value out of range.
-  static RegistrationOptions from_voxel_size(float voxel_size,
-                                             std::uint32_t quality = kDefaultQuality);
-
-  /// A copy with the number of candidates of a quality, everything else as it is.
-  /// @throws InvalidArgument if quality is above 10.
-  RegistrationOptions with_quality(std::uint32_t quality) const;
-
-  /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III):
-  /// 4,000,000 quadruples, no refinement.
-  static RegistrationOptions loopsmart();
-
-  /// The paper's algorithm with its lengths scaled to another voxel size (the paper's own is 0.05).
-  /// @throws InvalidArgument for a voxel size out of range.
-  static RegistrationOptions loopsmart(float voxel_size);
+  /// The paper's algorithm with the paper's numbers, in voxels (Zhang and Chen, LoopSmart, section
+  /// III): 4,000,000 quadruples, no refinement, no second features.
+  static RegistrationOptions loopsmart(float voxel_size = 0.05f);
 
   /// @throws InvalidArgument naming the first field that is out of range, and its value.
   void validate() const;

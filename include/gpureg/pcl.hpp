@@ -143,9 +143,9 @@ class PclRegistration : public pcl::Registration<PointSource, PointTarget, float
     source.viewpoints = view_of(*this->input_).viewpoints;
     source.viewpoint_count = source.viewpoints == nullptr ? 0 : 1;
     if (!prepared_target_.valid())
-      prepared_target_ = prepare(context_, view_of(*this->target_), options_.prepare);
-    result_ = gpureg::align(context_, prepare(context_, source, options_.prepare), prepared_target_,
-                            options_);
+      prepared_target_ = prepare(context_, view_of(*this->target_), options_);
+    result_ =
+        gpureg::align(context_, prepare(context_, source, options_), prepared_target_, options_);
     this->converged_ = result_.aligned();
     if (!this->converged_) return;
     this->final_transformation_ = this->transformation_ =

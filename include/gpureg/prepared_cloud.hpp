@@ -7,12 +7,12 @@
 #include <memory>
 #include <vector>
 
-#include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
 
 namespace gpureg {
 
 struct Access;
+struct PrepareSettings;
 struct PreparedState;
 
 /// Point cloud prepared for alignment: downsampled points, normals, features, search grid and depth
@@ -30,7 +30,8 @@ class PreparedCloud {
   std::size_t size() const;               ///< number of prepared points
   std::size_t feature_dimension() const;  ///< floats per feature, 33 for FPFH
   const PrepareStatistics& statistics() const;
-  const PrepareOptions& options() const;
+  float voxel_size() const;                 ///< RegistrationOptions::voxel_size
+  const PrepareSettings& settings() const;  ///< for the library: a type of its own
 
   /// @return PointCloudView::origin: points() and viewpoints() are rows relative to it.
   Eigen::Vector3d origin() const;

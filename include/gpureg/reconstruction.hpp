@@ -88,9 +88,9 @@ struct Surface {
   std::vector<Eigen::Vector3f> viewpoints = {};
 };
 
-/// Options of prepare() for the points of a Surface: half the voxel size, and nothing that only
-/// registration needs.
-PrepareOptions surface_options(PrepareOptions registration);
+/// Options of prepare() for the points of a Surface: half the voxel size with the other lengths as
+/// they are, and nothing that only registration needs.
+RegistrationOptions surface_options(RegistrationOptions registration);
 
 /// The points of a cloud that prepare() made with surface_options(), and its viewpoints if the
 /// caller gave them.
@@ -100,42 +100,39 @@ Surface surface_of(const PreparedCloud& cloud);
 /// @param registration options of the registration of the pairs.
 /// @throws InvalidArgument as prepare().
 Surface surface_of(const Context& context, PointCloudView cloud,
-                   const PrepareOptions& registration);
+                   const RegistrationOptions& registration);
 
-/// Options of refine(). The lengths are for voxels of 5 cm.
+/// Options of refine(). Lengths are in voxels.
 struct RefineOptions {
-  /// Largest distance of a correspondence in the first iterations, metres, > 0.
-  double initial_distance = 0.15;
-  double final_distance = 0.05;  ///< the same in the last ones, metres, > 0, <= initial_distance
+  float voxel_size = 0.05f;  ///< of the registration, in the unit of the points
+  /// Largest distance of a correspondence in the first iterations, > 0.
+  double initial_distance = 3;
+  double final_distance = 1;     ///< the same in the last ones, > 0, <= initial_distance
   double max_normal_angle = 45;  ///< degrees between the normals of a correspondence, (0, 90]
   /// Width of the Geman-McClure kernel on the point-to-plane distance in the last iterations,
-  /// metres, > 0; it shrinks with the distance.
-  double kernel_width = 0.02;
+  /// > 0; it shrinks with the distance.
+  double kernel_width = 0.4;
   int iterations = 10;  ///< >= 1
   /// RMS distance between the measured and the refined pose over the overlap from which an edge is
-  /// rejected in the end, metres, > 0; edges that alone connect two parts stay.
-  double max_edge_error = 0.2;
+  /// rejected in the end, > 0; edges that alone connect two parts stay.
+  double max_edge_error = 4;
   /// Points of a scan that look for correspondences in one other scan, evenly chosen, >= 16.
   std::uint32_t max_points = 1500;
   /// Points within initial_distance of the other scan from which two scans overlap, >= 1.
   std::uint32_t min_overlap = 100;
-  /// Standard deviation of a point-to-plane distance, metres, > 0, and the number of neighbouring
+  /// Standard deviation of a point-to-plane distance, > 0, and the number of neighbouring
   /// points whose errors count as one, >= 1: how much surfaces weigh beside the edges.
-  double point_noise = 0.01;
+  double point_noise = 0.2;
   double correlated_points = 20;
   /// Range from which the noise of a point grows with the square of its distance to the closest
-  /// viewpoint, as that of depth cameras, metres, > 0; infinity: it does not grow.
+  /// viewpoint, as that of depth cameras, > 0; infinity: it does not grow.
   double noise_range = std::numeric_limits<double>::infinity();
   int threads = 0;  ///< 0: one per core. Results do not depend on it.
   /// Called before every iteration with its number; true ends the refinement. May be empty.
-  std::function<bool(int)> should_stop;
+  std::function<bool(int)> should_stop = {};
 
-  /// Every length from the voxel size of the registration.
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static RefineOptions from_voxel_size(float voxel_size);
-
-  /// The same for depth cameras: noise_range is thirty voxels.
-  static RefineOptions for_depth_cameras(float voxel_size);
+  /// For depth cameras: noise_range is thirty voxels.
+  static RefineOptions for_depth_cameras(float voxel_size = 0.05f);
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

@@ -24,14 +24,14 @@ namespace gpureg {
 /// Thread-safe.
 /// @param context backend that prepares and holds the cloud.
 /// @param cloud host memory, lengths in metres (or the unit of the options).
-/// @param options radii and voxel size.
+/// @param options voxel_size and prepare.
 /// @return handle to the prepared cloud.
 /// @throws InvalidArgument for options or views out of range, and for points that do not fit the
 ///   options: a cloud wider than 2^20 voxels or too dense for the radii, or more than 20,000 points
 ///   of which nearly all are isolated (millimetres with a voxel size in metres).
 /// @throws DeviceError if the device fails.
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
-                      const PrepareOptions& options = {});
+                      const RegistrationOptions& options = {});
 
 /// prepare() for many clouds at once; each result equals that of prepare() alone.
 /// @param names names of the clouds in error messages, as many as clouds, or none (clouds[0],
@@ -40,7 +40,7 @@ PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
 /// @throws InvalidArgument as prepare() does, naming the cloud.
 std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const std::vector<PointCloudView>& clouds,
-                                         const PrepareOptions& options = {},
+                                         const RegistrationOptions& options = {},
                                          const std::vector<std::string>& names = {});
 
 /// Finds target_from_source of two prepared clouds by options.method. Thread-safe.
@@ -54,8 +54,8 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
 /// conditions).
 /// @param source cloud that the pose moves.
 /// @param target cloud that stays.
-/// @param options options.prepare is validated but not applied; each cloud keeps the options that
-///   it was prepared with.
+/// @param options options.prepare is validated but not applied; each cloud keeps what it was
+///   prepared with.
 /// @return the result; "no alignment" is a status, not an error.
 /// @throws InvalidArgument if a correspondence distance exceeds that of the preparation, if
 ///   the dimensions of the features differ, and for clouds of another backend.
@@ -71,7 +71,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationPrior& prior,
                          const RegistrationOptions& options = {});
 
-/// Prepares both clouds with options.prepare and aligns them. Prepare clouds of several pairs once
+/// Prepares both clouds and aligns them. Prepare clouds of several pairs once
 /// instead.
 /// @throws InvalidArgument as prepare() and align() do.
 RegistrationResult align(const Context& context, const PointCloudView& source,

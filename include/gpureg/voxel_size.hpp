@@ -26,7 +26,7 @@ const char* explain(VoxelSizeReason reason);
 
 /// Suggestion of suggest_voxel_size(). Lengths are in the unit of the points.
 struct VoxelSizeSuggestion {
-  float voxel_size = 0;  ///< for RegistrationOptions::from_voxel_size(); 0: none, see reason
+  float voxel_size = 0;  ///< for RegistrationOptions; 0: none, see reason
   VoxelSizeReason reason = VoxelSizeReason::no_clouds;
   double spacing = 0;  ///< median distance of a point to its nearest distinct neighbour
   /// Median RMS distance of points from the plane fitted to their neighbourhood, about a voxel

@@ -46,7 +46,7 @@ void bind_cloud(py::module_& m) {
           "statistics", [](const Cloud& c) { return c.prepared.statistics(); },
           "Counts and times of the preparation.")
       .def_property_readonly(
-          "options", [](const Cloud& c) { return c.prepared.options(); },
+          "voxel_size", [](const Cloud& c) { return shortest(c.prepared.voxel_size()); },
           "What it was prepared with.")
       .def_property_readonly(
           "origin", [](const Cloud& c) { return array_of(c.prepared.origin()); },
@@ -67,8 +67,7 @@ void bind_cloud(py::module_& m) {
       .def("__repr__", [](const Cloud& c) {
         return "<gpureg.PreparedCloud, " + std::to_string(c.prepared.size()) + " points of " +
                std::to_string(c.prepared.statistics().input_points) + ", voxel size " +
-               py::repr(py::float_(shortest(c.prepared.options().voxel_size))).cast<std::string>() +
-               ">";
+               py::repr(py::float_(shortest(c.prepared.voxel_size()))).cast<std::string>() + ">";
       });
 }
 

@@ -70,6 +70,8 @@ std::string expected() {
     return fields::names_of<M>("'");
   else if constexpr (std::is_floating_point_v<M>)
     return "a number";
+  else if constexpr (std::is_same_v<M, std::string>)
+    return "a text";
   else if constexpr (std::is_same_v<M, std::array<double, 6>>)
     return "6 numbers";
   else if constexpr (std::is_integral_v<M>)
@@ -141,8 +143,8 @@ Field<T> field(std::string name, M T::* member, std::string doc) {
     }
   };
   f.define = [member](py::class_<T>& cls, const Field<T>& self, bool writable) {
-    if constexpr (std::is_class_v<M>) {
-      // By reference, so that options.prepare.voxel_size = 0.1 changes options.
+    if constexpr (std::is_class_v<M> && !std::is_same_v<M, std::string>) {
+      // By reference, so that options.prepare.depth_maps = 4 changes options.
       if (writable)
         cls.def_property(
             self.name.c_str(), [member](T& t) -> M& { return t.*member; },

@@ -73,16 +73,6 @@ std::vector<LocateResult> locate_all(const Context& context, const py::list& sca
   return interruptible([&] { return locate(context, views, map, options, priors, names); });
 }
 
-template <typename T>
-void bind_from_voxel_size(py::class_<T>& cls) {
-  cls.def_static(
-      "from_voxel_size",
-      [](const py::object& voxel_size) {
-        return T::from_voxel_size(argument<float>(voxel_size, "voxel_size"));
-      },
-      py::arg("voxel_size"), "Every length from the voxel size (metres).");
-}
-
 ChangeResult compare(const Context& context, const py::tuple& scan, const PreparedMap& map,
                      const DoubleArray& pose, const ChangeOptions options) {
   const Input input(scan);
@@ -105,8 +95,7 @@ py::array_t<float> probabilities_of(const PointChanges& changes) {
 }
 
 void bind_change(py::module_& m) {
-  auto options = bind_options_class<ChangeOptions>(m);
-  bind_from_voxel_size(options);
+  bind_options_class<ChangeOptions>(m);
   using C = ChangeResult;
   py::class_<C>(m, "ChangeResult",
                 "Labels of the points of a scan and of a map: rows of CHANGE_LABELS.")
@@ -140,10 +129,8 @@ void bind_change(py::module_& m) {
 }  // namespace
 
 void bind_localization(py::module_& m) {
-  auto map_options = bind_options_class<MapOptions>(m);
-  bind_from_voxel_size(map_options);
-  auto locate_options = bind_options_class<LocateOptions>(m);
-  bind_from_voxel_size(locate_options);
+  bind_options_class<MapOptions>(m);
+  bind_options_class<LocateOptions>(m);
 
   py::class_<PreparedMap>(m, "PreparedMap", "A map that scans are located in; see prepare_map.")
       .def("__len__", &PreparedMap::size)

@@ -29,14 +29,7 @@ std::vector<PairConsistency> consistency_of(const IndexArray& pairs, const py::l
 }  // namespace
 
 void bind_loop_consistency(py::module_& m) {
-  auto cls = bind_options_class<LoopConsistencyOptions>(m);
-  cls.def_static(
-      "from_voxel_size",
-      [](const py::object& voxel_size) {
-        return LoopConsistencyOptions::from_voxel_size(argument<float>(voxel_size, "voxel_size"));
-      },
-      py::arg("voxel_size"),
-      "closing_distance of three voxels; the rest does not depend on the voxel.");
+  bind_options_class<LoopConsistencyOptions>(m);
   bind_record_class<PairConsistency>(m);
   m.def("loop_consistency", &consistency_of, py::arg("pairs"), py::arg("results"),
         py::arg("options"));

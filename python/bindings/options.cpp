@@ -5,21 +5,8 @@
 #include "fields/options.hpp"
 
 namespace gpureg::python {
-namespace {
-
-std::uint32_t quality_of(const py::object& value) {
-  return argument<std::uint32_t>(value, "quality",
-                                 "a whole number from 0 to " + std::to_string(kHighestQuality));
-}
-
-}  // namespace
-
 void bind_options(py::module_& m) {
   bind_options_class<PrepareOptions>(m);
-  bind_options_class<CompatibilityOptions>(m);
-  bind_options_class<QuadrupleOptions>(m);
-  bind_options_class<RefineOptions>(m);
-  bind_options_class<EvidenceOptions>(m);
   bind_options_class<ConfidenceCalibration>(m)
       .def(
           "__call__",
@@ -27,28 +14,13 @@ void bind_options(py::module_& m) {
           py::arg("confidence"), "The calibrated probability.")
       .def_property_readonly("is_identity", &ConfidenceCalibration::is_identity,
                              "Whether it changes nothing.");
-  auto cls = bind_options_class<RegistrationOptions>(m);
-  cls.def_static(
-      "from_voxel_size",
-      [](const py::object& voxel_size, const py::object& quality) {
-        return RegistrationOptions::from_voxel_size(argument<float>(voxel_size, "voxel_size"),
-                                                    quality_of(quality));
-      },
-      py::arg("voxel_size"), py::arg("quality") = kDefaultQuality,
-      "Every length from the voxel size (metres); quality, 0 to 10, trades time for recall.");
-  cls.def(
-      "with_quality",
-      [](const RegistrationOptions& o, const py::object& quality) {
-        return o.with_quality(quality_of(quality));
-      },
-      py::arg("quality"), "A copy with quality's number of candidates, everything else as it is.");
-  cls.def_static(
+  bind_options_class<RegistrationOptions>(m).def_static(
       "loopsmart",
       [](const py::object& voxel_size) {
         return RegistrationOptions::loopsmart(argument<float>(voxel_size, "voxel_size"));
       },
-      py::arg("voxel_size") = shortest(PrepareOptions{}.voxel_size),
-      "The paper's algorithm with its lengths scaled to the voxel size (metres).");
+      py::arg("voxel_size") = shortest(RegistrationOptions{}.voxel_size),
+      "The paper's algorithm with the paper's numbers.");
 }
 
 }  // namespace gpureg::python

@@ -35,7 +35,7 @@ constexpr std::size_t kDevicePoints = std::size_t(1) << 25, kDeviceClouds = 256;
 /// Prepares clouds that are on a device.
 std::vector<PreparedCloud> prepare_on_device(const Context& context,
                                              const std::vector<const Input*>& inputs,
-                                             const PrepareOptions& options,
+                                             const RegistrationOptions& options,
                                              const std::vector<std::string>& names) {
   std::vector<PreparedCloud> out;
   for (std::size_t begin = 0, end; begin < inputs.size(); begin = end) {
@@ -60,7 +60,7 @@ std::vector<PreparedCloud> prepare_on_device(const Context& context,
 
 /// Clouds on a device in batches, those of the host as one batch.
 std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Input>& inputs,
-                                  const PrepareOptions& options,
+                                  const RegistrationOptions& options,
                                   const std::vector<std::string>& names) {
   std::vector<PointCloudView> views;
   std::vector<const Input*> device_inputs;
@@ -87,13 +87,13 @@ std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Inpu
 void bind_prepare(py::module_& m) {
   m.def(
       "prepare_batch",
-      [](const Context& context, const py::sequence& clouds, const PrepareOptions options,
+      [](const Context& context, const py::sequence& clouds, const RegistrationOptions options,
          const std::vector<std::string>& names) {
         std::vector<Input> inputs;
         for (const py::handle cloud : clouds) inputs.emplace_back(cloud.cast<py::tuple>());
         if (!names.empty() && names.size() != inputs.size())
           throw py::value_error("names: expected one for each cloud");
-        if (options.depth_maps > 0) warn_of_viewpoints(inputs, names);
+        if (options.prepare.depth_maps > 0) warn_of_viewpoints(inputs, names);
         std::vector<Cloud> prepared =
             interruptible([&] { return prepare_clouds(context, inputs, options, names); });
         py::list out;

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._core import PointCloud, PreparedCloud, PrepareOptions
+from ._core import FindOptions, MapOptions, PointCloud, PreparedCloud, RegistrationOptions
 from ._device import DeviceRows, device_rows, on_device, stream_of
 from ._formats import read_foreign
 from ._mesh import mesh_as_cloud
@@ -34,6 +34,7 @@ CoreCloud = tuple[
 
 _HOST_DEVICES = (1, 3)  # DLPack's kDLCPU and kDLCUDAHost
 # float32 must resolve this part of a voxel, or coordinates are moved before they become float32.
+_FINE_VOXEL = 0.05  # of clouds that are stored before anybody says a voxel size
 _PARTS_OF_VOXEL = 256
 _MILLIMETRE = 1e-3  # what stands in for the voxel where points are kept as they are
 # A cloud that float32 divides into so many steps is fine whatever its unit: a part in millimetres,
@@ -210,7 +211,7 @@ def stored_cloud(
     if bounds is not None and not np.array_equal(rows, raw, equal_nan=True):
         step = _step(bounds[2])
         middle, spread = _middle(raw)
-        if step * _PARTS_OF_VOXEL > PrepareOptions().voxel_size and step * _STEPS > spread:
+        if step * _PARTS_OF_VOXEL > _FINE_VOXEL and step * _STEPS > spread:
             origin, rows = middle, float_rows(raw - middle, "points")
     if normals is not None:
         normals = matrix(normals, "normals", 3)
@@ -240,7 +241,7 @@ def core_cloud(
     normals: Any,
     features: Any,
     viewpoints: Any,
-    options: PrepareOptions,
+    options: RegistrationOptions | MapOptions | FindOptions,
     name: str = "points",
     device: bool = False,
 ) -> CoreCloud:

@@ -305,7 +305,7 @@ def _usable(
 ) -> tuple[list[PreparedCloud], list[int]]:
     """Prepared, and their positions."""
     unusable: dict[int, str] = {}
-    clouds = usable_fragments(fragments, options.prepare, context, progress, unusable)
+    clouds = usable_fragments(fragments, options, context, progress, unusable)
     return clouds, [k for k in range(len(fragments)) if k not in unusable]
 
 
@@ -320,9 +320,7 @@ def options_of(
 ) -> tuple[RegistrationOptions, AuditOptions]:
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     options.validate()
-    audit_options = checked(
-        audit_options, AuditOptions, "audit_options"
-    ) or AuditOptions.from_voxel_size(options.prepare.voxel_size)
+    audit_options = checked(audit_options, AuditOptions, "audit_options") or AuditOptions()
     audit_options.validate()
     return options, audit_options
 

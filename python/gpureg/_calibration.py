@@ -235,7 +235,7 @@ def calibrate(
             raise ValueError(
                 f"poses: expected shape ({len(fragments)}, 4, 4), got {np.shape(poses)}"
             )
-    inputs = [fragments.load(k, options.prepare) for k in range(len(fragments))]
+    inputs = [fragments.load(k, options) for k in range(len(fragments))]
     with _told(progress) as tell:
         found = _core.calibrate(
             context, inputs, options, numbers["self_pairs"], numbers["scan_pairs"], known, tell
@@ -250,7 +250,7 @@ def calibrate(
             0.05,
             found["calibration"],
         )
-    voxel_size = options.prepare.voxel_size
+    voxel_size = options.voxel_size
     return CalibrationRun(voxel_size=voxel_size, risk=risk, options=copy.copy(options), **found)
 
 

@@ -53,7 +53,7 @@ class Context:
 
 class PrepareOptions:
     # fields of PrepareOptions
-    voxel_size: float
+    downsample: bool
     normal_radius: float
     feature_radius: float
     wide_feature_radius: float
@@ -64,7 +64,7 @@ class PrepareOptions:
     def __init__(
         self,
         *,
-        voxel_size: float = ...,
+        downsample: bool = ...,
         normal_radius: float = ...,
         feature_radius: float = ...,
         wide_feature_radius: float = ...,
@@ -76,7 +76,7 @@ class PrepareOptions:
     def replace(
         self,
         *,
-        voxel_size: float = ...,
+        downsample: bool = ...,
         normal_radius: float = ...,
         feature_radius: float = ...,
         wide_feature_radius: float = ...,
@@ -85,151 +85,6 @@ class PrepareOptions:
         surface_side_distance: float = ...,
         keep_range_limits: bool = ...,
     ) -> PrepareOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
-    # end of fields
-
-class CompatibilityOptions:
-    # fields of CompatibilityOptions
-    max_matches: int
-    seeds: int
-    max_members: int
-    triangles: int
-    refits: int
-    tolerance: float
-    max_turn: float
-    consensus_distance: float
-    seed_separation: float
-    def __init__(
-        self,
-        *,
-        max_matches: int = ...,
-        seeds: int = ...,
-        max_members: int = ...,
-        triangles: int = ...,
-        refits: int = ...,
-        tolerance: float = ...,
-        max_turn: float = ...,
-        consensus_distance: float = ...,
-        seed_separation: float = ...,
-    ) -> None: ...
-    def replace(
-        self,
-        *,
-        max_matches: int = ...,
-        seeds: int = ...,
-        max_members: int = ...,
-        triangles: int = ...,
-        refits: int = ...,
-        tolerance: float = ...,
-        max_turn: float = ...,
-        consensus_distance: float = ...,
-        seed_separation: float = ...,
-    ) -> CompatibilityOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
-    # end of fields
-
-class QuadrupleOptions:
-    # fields of QuadrupleOptions
-    count: int
-    neighbors: int
-    mutual: bool
-    edge_similarity: float
-    max_survivors: int
-    max_normal_angle: float
-    max_verification_normal_angle: float
-    min_inlier_ratio: float
-    def __init__(
-        self,
-        *,
-        count: int = ...,
-        neighbors: int = ...,
-        mutual: bool = ...,
-        edge_similarity: float = ...,
-        max_survivors: int = ...,
-        max_normal_angle: float = ...,
-        max_verification_normal_angle: float = ...,
-        min_inlier_ratio: float = ...,
-    ) -> None: ...
-    def replace(
-        self,
-        *,
-        count: int = ...,
-        neighbors: int = ...,
-        mutual: bool = ...,
-        edge_similarity: float = ...,
-        max_survivors: int = ...,
-        max_normal_angle: float = ...,
-        max_verification_normal_angle: float = ...,
-        min_inlier_ratio: float = ...,
-    ) -> QuadrupleOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
-    # end of fields
-
-class RefineOptions:
-    # fields of RefineOptions
-    max_iterations: int
-    kernel_width: float
-    def __init__(
-        self,
-        *,
-        max_iterations: int = ...,
-        kernel_width: float = ...,
-    ) -> None: ...
-    def replace(
-        self,
-        *,
-        max_iterations: int = ...,
-        kernel_width: float = ...,
-    ) -> RefineOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
-    # end of fields
-
-class EvidenceOptions:
-    # fields of EvidenceOptions
-    sample: int
-    modes: int
-    max_normal_angle: float
-    mode_angle: float
-    mode_distance: float
-    degeneracy_search_distance: float
-    free_space_margin: float
-    min_range: float
-    def __init__(
-        self,
-        *,
-        sample: int = ...,
-        modes: int = ...,
-        max_normal_angle: float = ...,
-        mode_angle: float = ...,
-        mode_distance: float = ...,
-        degeneracy_search_distance: float = ...,
-        free_space_margin: float = ...,
-        min_range: float = ...,
-    ) -> None: ...
-    def replace(
-        self,
-        *,
-        sample: int = ...,
-        modes: int = ...,
-        max_normal_angle: float = ...,
-        mode_angle: float = ...,
-        mode_distance: float = ...,
-        degeneracy_search_distance: float = ...,
-        free_space_margin: float = ...,
-        min_range: float = ...,
-    ) -> EvidenceOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
@@ -263,46 +118,46 @@ class ConfidenceCalibration:
 
 class RegistrationOptions:
     # fields of RegistrationOptions
+    voxel_size: float
+    quality: int
     seed: int
     min_confidence: float
     accept_symmetry: bool
     calibration: ConfidenceCalibration
     method: Literal["compatibility", "quadruples"]
-    smaller_as_source: bool
+    quadruples: int
+    refine_iterations: int
     prepare: PrepareOptions
-    quadruples: QuadrupleOptions
-    refine: RefineOptions
-    compatibility: CompatibilityOptions
-    evidence: EvidenceOptions
+    tune: str
     def __init__(
         self,
         *,
+        voxel_size: float = ...,
+        quality: int = ...,
         seed: int = ...,
         min_confidence: float = ...,
         accept_symmetry: bool = ...,
         calibration: ConfidenceCalibration = ...,
         method: Literal["compatibility", "quadruples"] = ...,
-        smaller_as_source: bool = ...,
+        quadruples: int = ...,
+        refine_iterations: int = ...,
         prepare: PrepareOptions = ...,
-        quadruples: QuadrupleOptions = ...,
-        refine: RefineOptions = ...,
-        compatibility: CompatibilityOptions = ...,
-        evidence: EvidenceOptions = ...,
+        tune: str = ...,
     ) -> None: ...
     def replace(
         self,
         *,
+        voxel_size: float = ...,
+        quality: int = ...,
         seed: int = ...,
         min_confidence: float = ...,
         accept_symmetry: bool = ...,
         calibration: ConfidenceCalibration = ...,
         method: Literal["compatibility", "quadruples"] = ...,
-        smaller_as_source: bool = ...,
+        quadruples: int = ...,
+        refine_iterations: int = ...,
         prepare: PrepareOptions = ...,
-        quadruples: QuadrupleOptions = ...,
-        refine: RefineOptions = ...,
-        compatibility: CompatibilityOptions = ...,
-        evidence: EvidenceOptions = ...,
+        tune: str = ...,
     ) -> RegistrationOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -310,10 +165,7 @@ class RegistrationOptions:
     _fields: tuple[str, ...]
     # end of fields
     @staticmethod
-    def from_voxel_size(voxel_size: float, quality: int = 5) -> RegistrationOptions: ...
-    @staticmethod
     def loopsmart(voxel_size: float = ...) -> RegistrationOptions: ...
-    def with_quality(self, quality: int) -> RegistrationOptions: ...
 
 class RegistrationStatistics:
     # fields of RegistrationStatistics
@@ -562,6 +414,7 @@ class RegistrationResult:
 
 class LoopConsistencyOptions:
     # fields of LoopConsistencyOptions
+    voxel_size: float
     closing_angle: float
     closing_distance: float
     false_closure_rate: float
@@ -576,6 +429,7 @@ class LoopConsistencyOptions:
     def __init__(
         self,
         *,
+        voxel_size: float = ...,
         closing_angle: float = ...,
         closing_distance: float = ...,
         false_closure_rate: float = ...,
@@ -591,6 +445,7 @@ class LoopConsistencyOptions:
     def replace(
         self,
         *,
+        voxel_size: float = ...,
         closing_angle: float = ...,
         closing_distance: float = ...,
         false_closure_rate: float = ...,
@@ -608,8 +463,6 @@ class LoopConsistencyOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> LoopConsistencyOptions: ...
 
 class PairConsistency:
     # fields of PairConsistency
@@ -696,7 +549,7 @@ class PreparedCloud:
     @property
     def statistics(self) -> PrepareStatistics: ...
     @property
-    def options(self) -> PrepareOptions: ...
+    def voxel_size(self) -> float: ...
     @property
     def origin(self) -> _Float64: ...
     @property
@@ -728,7 +581,10 @@ class PointCloud:
 
 def describe_backends() -> list[str]: ...
 def prepare_batch(
-    context: Context, clouds: Sequence[Any], options: PrepareOptions, names: Sequence[str] = ...
+    context: Context,
+    clouds: Sequence[Any],
+    options: RegistrationOptions,
+    names: Sequence[str] = ...,
 ) -> list[PreparedCloud]: ...
 def align(
     context: Context,
@@ -1082,11 +938,10 @@ class AuditOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> AuditOptions: ...
 
 class ReconstructionOptions:
     # fields of ReconstructionOptions
+    voxel_size: float
     consistency: LoopConsistencyOptions
     noise: EdgeNoiseOptions
     drift: DriftOptions
@@ -1099,6 +954,7 @@ class ReconstructionOptions:
     def __init__(
         self,
         *,
+        voxel_size: float = ...,
         consistency: LoopConsistencyOptions = ...,
         noise: EdgeNoiseOptions = ...,
         drift: DriftOptions = ...,
@@ -1112,6 +968,7 @@ class ReconstructionOptions:
     def replace(
         self,
         *,
+        voxel_size: float = ...,
         consistency: LoopConsistencyOptions = ...,
         noise: EdgeNoiseOptions = ...,
         drift: DriftOptions = ...,
@@ -1127,8 +984,6 @@ class ReconstructionOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> ReconstructionOptions: ...
 
 class LoopProposalOptions:
     # fields of LoopProposalOptions
@@ -1217,7 +1072,7 @@ class FragmentSource:
         self,
         names: Sequence[str],
         fingerprints: Sequence[str],
-        load: Callable[[int, PrepareOptions], Any],
+        load: Callable[[int, RegistrationOptions], Any],
     ) -> None: ...
 
 class PairJournal:
@@ -1267,7 +1122,7 @@ def in_tiles(pairs: npt.NDArray[np.uint32]) -> list[int]: ...
 def prepare_set(
     context: Context,
     fragments: FragmentSource,
-    options: PrepareOptions,
+    options: RegistrationOptions,
     progress: Callable[[int], object] | None = None,
 ) -> list[PreparedCloud | str]: ...
 def register_set(
@@ -1281,12 +1136,14 @@ def register_set(
 
 class MapOptions:
     # fields of MapOptions
+    voxel_size: float
     prepare: PrepareOptions
     tile_size: float
     halo: float
     def __init__(
         self,
         *,
+        voxel_size: float = ...,
         prepare: PrepareOptions = ...,
         tile_size: float = ...,
         halo: float = ...,
@@ -1294,6 +1151,7 @@ class MapOptions:
     def replace(
         self,
         *,
+        voxel_size: float = ...,
         prepare: PrepareOptions = ...,
         tile_size: float = ...,
         halo: float = ...,
@@ -1303,14 +1161,11 @@ class MapOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> MapOptions: ...
 
 class LocateOptions:
     # fields of LocateOptions
     registration: RegistrationOptions
     min_confidence: float
-    max_matches: int
     coarse_factor: float
     coarse_tiles: int
     fine_tiles: int
@@ -1321,7 +1176,6 @@ class LocateOptions:
         *,
         registration: RegistrationOptions = ...,
         min_confidence: float = ...,
-        max_matches: int = ...,
         coarse_factor: float = ...,
         coarse_tiles: int = ...,
         fine_tiles: int = ...,
@@ -1333,7 +1187,6 @@ class LocateOptions:
         *,
         registration: RegistrationOptions = ...,
         min_confidence: float = ...,
-        max_matches: int = ...,
         coarse_factor: float = ...,
         coarse_tiles: int = ...,
         fine_tiles: int = ...,
@@ -1345,8 +1198,6 @@ class LocateOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> LocateOptions: ...
 
 class PreparedMap:
     def __len__(self) -> int: ...
@@ -1436,8 +1287,6 @@ class ChangeOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> ChangeOptions: ...
 
 class ChangeResult:
     @property
@@ -1561,6 +1410,7 @@ class LoopClosureOptions:
     acceptance: LoopAcceptanceOptions
     noise: EdgeNoiseOptions
     information_unit: float
+    host_noise: LoopNoiseOptions
     graph: PoseGraphOptions
     drift_correlation: float
     gravity_sigma: float
@@ -1577,6 +1427,7 @@ class LoopClosureOptions:
         acceptance: LoopAcceptanceOptions = ...,
         noise: EdgeNoiseOptions = ...,
         information_unit: float = ...,
+        host_noise: LoopNoiseOptions = ...,
         graph: PoseGraphOptions = ...,
         drift_correlation: float = ...,
         gravity_sigma: float = ...,
@@ -1594,6 +1445,7 @@ class LoopClosureOptions:
         acceptance: LoopAcceptanceOptions = ...,
         noise: EdgeNoiseOptions = ...,
         information_unit: float = ...,
+        host_noise: LoopNoiseOptions = ...,
         graph: PoseGraphOptions = ...,
         drift_correlation: float = ...,
         gravity_sigma: float = ...,
@@ -1608,8 +1460,6 @@ class LoopClosureOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> LoopClosureOptions: ...
     @staticmethod
     def loopsmart(voxel_size: float = ...) -> LoopClosureOptions: ...
 

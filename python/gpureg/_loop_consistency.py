@@ -30,7 +30,7 @@ def loop_consistency(
     results : sequence of RegistrationResult
         One per pair, as `align_batch` returns them. They are not changed.
     options : LoopConsistencyOptions, optional
-        Default: those of 5 cm voxels; see ``LoopConsistencyOptions.from_voxel_size``.
+        ``voxel_size`` is that of the clouds; default 0.05.
 
     Returns
     -------

@@ -225,12 +225,10 @@ class Map:
         islands = self._graph.islands
         if not 0 <= island < len(islands):
             raise IndexError(f"island is {island}, but the map has {len(islands)}")
-        merged = _core.VoxelMap(
-            self._options.prepare.voxel_size / 2 if voxel_size is None else voxel_size
-        )
+        merged = _core.VoxelMap(self._options.voxel_size / 2 if voxel_size is None else voxel_size)
         poses = self._graph.poses
         for k in islands[island]:
-            rows, normals, _, _, origin, _ = self._fragments.load(k, self._options.prepare)
+            rows, normals, _, _, origin, _ = self._fragments.load(k, self._options)
             merged.add(
                 np.ascontiguousarray(rows),
                 None if normals is None else np.ascontiguousarray(normals),

@@ -103,9 +103,9 @@ def reconstruct(
     ([[0, 1, 2]], [-0.5, 0.0, 0.0])
     """
     options, audit_options = options_of(options, audit_options)
-    map_options = checked(
-        map_options, ReconstructionOptions, "map_options"
-    ) or ReconstructionOptions.from_voxel_size(options.prepare.voxel_size)
+    map_options = (
+        checked(map_options, ReconstructionOptions, "map_options") or ReconstructionOptions()
+    )
     map_options.validate()
     context = context_of(context)
     fragments = fragment_set(fragments)

@@ -154,7 +154,7 @@ def register_all(
     >>> import numpy as np, gpureg, tempfile
     >>> cloud = np.random.default_rng(1).random((2000, 3))
     >>> fragments = [cloud, cloud + [0.5, 0, 0], cloud - [0, 2, 0]]
-    >>> few = gpureg.RegistrationOptions.from_voxel_size(0.05, quality=0)
+    >>> few = gpureg.RegistrationOptions(voxel_size=0.05, quality=0)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = gpureg.register_all(fragments, output=folder, options=few, progress=False)
     ...     table = run.table()

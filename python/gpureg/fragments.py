@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import CoreCloud, core_cloud, several, to_numpy
-from ._core import IoError, PrepareOptions
+from ._core import IoError, MapOptions, RegistrationOptions
 
 _PIECE = 1 << 20  # bytes of a file that are in memory while its fingerprint is made
 
@@ -139,7 +139,9 @@ class FragmentSet:
             [self._names[k] for k in kept],
         )
 
-    def load(self, position: int, options: PrepareOptions, device: bool = False) -> CoreCloud:
+    def load(
+        self, position: int, options: RegistrationOptions | MapOptions, device: bool = False
+    ) -> CoreCloud:
         """The fragment at a position (not: of a number), as the core takes it; device: on a GPU, if
         it is there. Thread-safe. Raises OSError for all that is wrong with a file.
         """
@@ -192,7 +194,7 @@ class FragmentSet:
             except OSError:
                 return "unreadable"
         else:
-            for part in self.load(position, PrepareOptions())[:5]:
+            for part in self.load(position, RegistrationOptions())[:5]:
                 digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
         viewpoints = self._viewpoints.get(self._numbers[position])
         if viewpoints is not None:

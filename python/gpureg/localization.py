@@ -23,7 +23,7 @@ from ._core import (
     LocateResult,
     MapOptions,
     PreparedMap,
-    PrepareOptions,
+    RegistrationOptions,
     load_map,
 )
 from ._map import Map
@@ -36,7 +36,7 @@ def _set_of(scans: Any, name: str) -> FragmentSet | list[Any]:
     return scans if isinstance(scans, FragmentSet) else several(scans, name)
 
 
-def _load(scans: FragmentSet | list[Any], options: PrepareOptions, name: str, k: int) -> CoreCloud:
+def _load(scans: FragmentSet | list[Any], options: MapOptions, name: str, k: int) -> CoreCloud:
     if isinstance(scans, FragmentSet):
         return scans.load(k, options)
     return core_cloud(scans[k], None, None, None, options, f"{name}[{k}]")
@@ -61,7 +61,7 @@ def prepare_map(
         A `Map` of these scans: its largest island. Or ``map_from_scan`` of each scan, all in one
         frame; those that are NaN are left out. None: clouds is one cloud in the frame of the map.
     options : MapOptions, optional
-        Default: voxels of 5 cm. See `MapOptions.from_voxel_size`.
+        Default: voxels of 5 cm.
     context : Context, optional
 
     Returns
@@ -79,14 +79,14 @@ def prepare_map(
     --------
     >>> import numpy as np, gpureg
     >>> room = np.random.default_rng(1).random((20000, 3)) * [4, 3, 2]
-    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions.from_voxel_size(0.1))
+    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions(voxel_size=0.1))
     >>> map.tiles
     1
     """
     options = checked(options, MapOptions, "options") or MapOptions()
     context = context_of(context)
     if poses is None:
-        cloud = core_cloud(clouds, None, None, None, options.prepare, "clouds")
+        cloud = core_cloud(clouds, None, None, None, options, "clouds")
         return _core.make_map(context, [cloud], None, options)
     scans = _set_of(clouds, "clouds")
     matrices = _largest_island(poses) if isinstance(poses, Map) else float64(poses, "poses")
@@ -98,7 +98,7 @@ def prepare_map(
 
     def inputs() -> Iterator[CoreCloud]:  # one scan in memory at a time
         for k in placed:
-            yield _load(scans, options.prepare, "clouds", int(k))
+            yield _load(scans, options, "clouds", int(k))
 
     return _core.make_map(context, inputs(), matrices[placed], options)
 
@@ -134,9 +134,8 @@ def locate_batch(
     scans: a sequence, a path as for `FragmentSet.from_directory`, or a `FragmentSet`.
     """
     map = checked(map, PreparedMap, "map")
-    voxel_size = map.options.prepare.voxel_size
-    options = checked(options, LocateOptions, "options") or LocateOptions.from_voxel_size(
-        voxel_size
+    options = checked(options, LocateOptions, "options") or LocateOptions(
+        registration=RegistrationOptions(voxel_size=map.options.voxel_size)
     )
     context = context_of(context)
     clouds = _set_of(scans, "scans")
@@ -145,7 +144,7 @@ def locate_batch(
         if isinstance(clouds, FragmentSet)
         else [f"scans[{k}]" for k in range(len(clouds))]
     )
-    inputs = [_load(clouds, map.options.prepare, "scans", k) for k in range(len(clouds))]
+    inputs = [_load(clouds, map.options, "scans", k) for k in range(len(clouds))]
     up = (
         None
         if scan_up is None
@@ -179,7 +178,7 @@ def locate(
     near : ((x, y, z), radius), optional
         Rough position of the origin of the scan's frame in the map, metres.
     options : LocateOptions, optional
-        Default: `LocateOptions.from_voxel_size` of the map.
+        ``registration`` has the voxel size of the map.
     context : Context, optional
 
     Returns
@@ -198,7 +197,7 @@ def locate(
     --------
     >>> import numpy as np, gpureg
     >>> room = np.random.default_rng(1).random((20000, 3)) * [4, 3, 2]
-    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions.from_voxel_size(0.1))
+    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions(voxel_size=0.1))
     >>> gpureg.locate(np.random.default_rng(2).random((3000, 3)) * 3, map).status
     'not_found'
     """
@@ -241,7 +240,6 @@ def change(
     map_from_scan : (4, 4) array, optional
         Pose of the scan, which is refined. None: the scan is located first.
     options : ChangeOptions, optional
-        Default: `ChangeOptions.from_voxel_size` of the map.
     context : Context, optional
 
     Returns
@@ -258,15 +256,13 @@ def change(
     --------
     >>> import numpy as np, gpureg
     >>> room = np.random.default_rng(1).random((20000, 3)) * [4, 3, 2]
-    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions.from_voxel_size(0.1))
+    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions(voxel_size=0.1))
     >>> result = gpureg.change(room, map, np.eye(4))
     >>> gpureg.CHANGE_LABELS[result.scan_labels[0]]
     'same'
     """
     map = checked(map, PreparedMap, "map")
-    options = checked(options, ChangeOptions, "options") or ChangeOptions.from_voxel_size(
-        map.options.prepare.voxel_size
-    )
+    options = checked(options, ChangeOptions, "options") or ChangeOptions()
     context = context_of(context)
     if map_from_scan is None:
         where = locate(scan, map, context=context)
@@ -276,12 +272,12 @@ def change(
     pose = float64(map_from_scan, "map_from_scan")
     if pose.shape != (4, 4):
         raise ValueError(f"map_from_scan: expected shape (4, 4), got {pose.shape}")
-    cloud = core_cloud(scan, None, None, None, map.options.prepare, "scan")
+    cloud = core_cloud(scan, None, None, None, map.options, "scan")
     return _core.find_changes(context, cloud, map, pose, options)
 
 
 # Meshes get as many samples as any part needs, whatever their unit.
-_ANY_SCALE = PrepareOptions(voxel_size=0)
+_ANY_SCALE = FindOptions(voxel_size=0)
 
 
 def find(

@@ -17,6 +17,7 @@ from ._core import (
     LoopUpdate,
     PoseGraph,
     PreparedCloud,
+    RegistrationOptions,
     RegistrationPrior,
     RegistrationResult,
 )
@@ -75,9 +76,9 @@ class LoopCloser:
         context: Context | None = None,
     ) -> None:
         self._context = context_of(context)
-        self._options = checked(
-            options, LoopClosureOptions, "options"
-        ) or LoopClosureOptions.from_voxel_size(voxel_size)
+        self._options = checked(options, LoopClosureOptions, "options") or LoopClosureOptions(
+            registration=RegistrationOptions(voxel_size=voxel_size)
+        )
         self._core = _core.LoopCloser(self._context, self._options)
         # process() holds the engine of its context while it registers. Clouds of all CPU contexts
         # are the same.
@@ -125,7 +126,7 @@ class LoopCloser:
             cloud = prepare(
                 cloud,
                 viewpoints=viewpoints,
-                options=self._options.registration.prepare,
+                options=self._options.registration,
                 context=self._preparing,
             )
         elif viewpoints is not None:

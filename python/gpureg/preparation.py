@@ -12,7 +12,7 @@ from typing import Any
 from . import _core
 from ._arrays import CoreCloud, core_cloud, several
 from ._contexts import checked, context_of
-from ._core import Context, IoError, PreparedCloud, PrepareOptions
+from ._core import Context, IoError, PreparedCloud, RegistrationOptions
 from ._progress import Progress, Report, batch_progress
 from .fragments import FragmentSet
 
@@ -26,7 +26,7 @@ def prepare(
     features: Any = None,
     *,
     viewpoints: Any = None,
-    options: PrepareOptions | None = None,
+    options: RegistrationOptions | None = None,
     context: Context | None = None,
 ) -> PreparedCloud:
     """Downsample a cloud, compute normals and features, and build its search grid.
@@ -58,8 +58,8 @@ def prepare(
         given. "none": unknown. "model": seen from everywhere, with given normals that point outwards,
         as of a sampled mesh, which needs no word. ``statistics.viewpoint`` of the cloud has the decision. With an
         unknown viewpoint there is no free space, and alignments try both sides of the surfaces.
-    options : PrepareOptions, optional
-        Must suit the options of the alignment: see ``RegistrationOptions.prepare``.
+    options : RegistrationOptions, optional
+        Those of the alignment: ``voxel_size`` and ``prepare`` are used.
     context : Context, optional
         Default: `default_context()`.
 
@@ -81,7 +81,7 @@ def prepare(
     >>> cloud.feature_dimension, cloud.statistics.input_points
     (33, 2000)
     """
-    options = checked(options, PrepareOptions, "options") or PrepareOptions()
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     context = context_of(context)
     cloud = core_cloud(
         points, normals, features, viewpoints, options, device=context.backend == "cuda"
@@ -92,7 +92,7 @@ def prepare(
 def prepare_batch(
     clouds: Sequence[Any],
     *,
-    options: PrepareOptions | None = None,
+    options: RegistrationOptions | None = None,
     context: Context | None = None,
     progress: Progress = False,
 ) -> list[PreparedCloud]:
@@ -114,7 +114,7 @@ def prepare_batch(
     >>> [len(c) > 0 for c in gpureg.prepare_batch([rng.random((500, 3)), rng.random((400, 3))])]
     [True, True]
     """
-    options = checked(options, PrepareOptions, "options") or PrepareOptions()
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     context = context_of(context)
     clouds = several(clouds, "clouds")
     names = [f"clouds[{k}]" for k in range(len(clouds))]
@@ -125,7 +125,7 @@ def prepare_batch(
 def _prepare(
     clouds: Sequence[Any],
     names: Sequence[str],
-    options: PrepareOptions,
+    options: RegistrationOptions,
     context: Context,
     report: Report | None,
 ) -> list[PreparedCloud]:
@@ -172,7 +172,7 @@ def check_prepared(cloud: Any, name: str) -> None:
 
 
 def prepared(
-    fragments: Sequence[Any], options: PrepareOptions, context: Context, progress: bool
+    fragments: Sequence[Any], options: RegistrationOptions, context: Context, progress: bool
 ) -> list[PreparedCloud]:
     """Those that are not prepared yet, prepared together; a cloud's place stays its own."""
     raw = [k for k, cloud in enumerate(fragments) if not isinstance(cloud, PreparedCloud)]
@@ -187,7 +187,7 @@ def prepared(
 
 def usable_fragments(
     fragments: FragmentSet,
-    options: PrepareOptions,
+    options: RegistrationOptions,
     context: Context,
     progress: Progress,
     unusable: dict[int, str],

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import to_numpy
 from ._contexts import default_context
-from ._core import CloudSummary, Context, PrepareOptions
+from ._core import CloudSummary, Context, RegistrationOptions
 from .fragments import FragmentSet, fragment_set
 
 _TOGETHER = 32  # clouds in memory at once
@@ -76,7 +76,7 @@ def summarize_all(
     fragments: Any,
     *,
     words: int = _WORDS,
-    options: PrepareOptions | None = None,
+    options: RegistrationOptions | None = None,
     context: Context | None = None,
 ) -> list[CloudSummary]:
     """What `likely_pairs` needs of a set's fragments, some 15 KB each: ``descriptor``, and
@@ -84,7 +84,7 @@ def summarize_all(
     """
     fragments, options, context = (
         fragment_set(fragments),
-        options or PrepareOptions(),
+        options or RegistrationOptions(),
         context or default_context(),
     )
 
@@ -129,7 +129,7 @@ class Nearest:
         Pairs per fragment on average.
     consecutive : int
         Also this many fragments that follow each one by number: scans of a walk.
-    options : PrepareOptions, optional
+    options : RegistrationOptions, optional
         Those of the run, usually.
     context : Context, optional
 
@@ -151,7 +151,7 @@ class Nearest:
 
     k: int = 20
     consecutive: int = 0
-    options: PrepareOptions | None = None
+    options: RegistrationOptions | None = None
     context: Context | None = None
     seconds: float = 0.0
 

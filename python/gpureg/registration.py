@@ -11,12 +11,11 @@ import numpy as np
 
 from . import _core
 from ._arrays import core_cloud, host_points, index_pairs, is_one_cloud, several
-from ._contexts import checked, context_of, milliseconds_of
+from ._contexts import checked, context_of, milliseconds_of, number_of, whole_number_of
 from ._core import (
     Context,
     InvalidArgument,
     PreparedCloud,
-    PrepareOptions,
     RegistrationOptions,
     RegistrationPrior,
     RegistrationResult,
@@ -121,14 +120,13 @@ def align_within(
         Wall time. Levels of quality are run upwards, and none that would end later is started; the
         lowest is always run. What is sure early ends early.
     options : RegistrationOptions, optional
-        What `RegistrationOptions.with_quality` sets is set per level.
+        ``quality`` is set per level.
     context : Context, optional
 
     Returns
     -------
     TimedResult
-        ``result`` is that of `align` with ``options.with_quality(quality)``, bit for
-        bit.
+        ``result`` is that of `align` with this ``quality``, bit for bit.
 
     Examples
     --------
@@ -183,7 +181,7 @@ def align_batch(
     Parameters
     ----------
     fragments : sequence of PreparedCloud
-        Or of whatever `prepare` takes as points; those are prepared with ``options.prepare``.
+        Or of whatever `prepare` takes as points; those are prepared with the options.
     pairs : (M, 2) integer array or list of pairs
         Rows (source, target): indices into fragments.
     priors : sequence of RegistrationPrior, optional
@@ -220,7 +218,7 @@ def align_batch(
     for k, prior in enumerate(known):
         if not isinstance(prior, RegistrationPrior):
             raise TypeError(f"priors[{k}]: expected a RegistrationPrior, got {prior!r}")
-    clouds = prepared(fragments, options.prepare, context, progress is True)
+    clouds = prepared(fragments, options, context, progress is True)
     with batch_progress(progress, "aligning", len(entries)) as report:
         results, error = _core.align_batch(context, clouds, entries, options, report, known)
     if isinstance(error, KeyboardInterrupt):
@@ -290,7 +288,7 @@ def align_scaled_batch(
     clouds = several(clouds, "clouds")
     entries = index_pairs(pairs, "pairs", len(clouds))
     inputs = [
-        core_cloud(cloud, None, None, None, options.prepare, f"clouds[{k}]")
+        core_cloud(cloud, None, None, None, options, f"clouds[{k}]")
         for k, cloud in enumerate(clouds)
     ]
     return _core.align_scaled_batch(
@@ -351,7 +349,7 @@ def register(
         Metres, or any unit that voxel_size has, too. Pictures: ``gpureg register --image``.
     voxel_size : float or "auto", optional
         Edge of the downsampling voxel; every other length follows from it. Default:
-        ``PrepareOptions().voxel_size``, 0.05. "auto": what `suggest_voxel_size` says.
+        ``RegistrationOptions().voxel_size``, 0.05. "auto": what `suggest_voxel_size` says.
     quality : int, optional
         From 0, the fastest, to 10, the highest recall. Default: 5.
     seed : int, optional
@@ -416,11 +414,11 @@ def register(
             voxel_size = suggestion.voxel_size
         elif isinstance(voxel_size, str):
             raise TypeError(f"voxel_size: expected a number or 'auto', got {voxel_size!r}")
-        options = RegistrationOptions.from_voxel_size(
-            PrepareOptions().voxel_size if voxel_size is None else voxel_size
-        )
+        options = RegistrationOptions()
+        if voxel_size is not None:
+            options.voxel_size = number_of(voxel_size, "voxel_size")
         if quality is not None:
-            options = options.with_quality(quality)
+            options.quality = whole_number_of(quality, "quality", 0)
         if seed is not None:
             options.seed = seed
     context = context_of(context)
@@ -430,14 +428,14 @@ def register(
         (source, source_viewpoint, "source"),
         (target, target_viewpoint, "target"),
     ):
-        clouds.append(core_cloud(cloud, None, None, viewpoint, options.prepare, name, device))
+        clouds.append(core_cloud(cloud, None, None, viewpoint, options, name, device))
     options.validate()
     if ends is not None:
         return _core.align_scaled_batch(
             context, clouds, [(0, 1)], *ends, options, ["source", "target"]
         )[0]
     try:
-        a, b = _core.prepare_batch(context, clouds, options.prepare, ["source", "target"])
+        a, b = _core.prepare_batch(context, clouds, options, ["source", "target"])
     except InvalidArgument as error:
         question = _unit_question(clouds, True)
         raise InvalidArgument(f"{error}; {question}") if question else error from None

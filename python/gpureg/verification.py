@@ -29,7 +29,7 @@ def verify(
     Parameters
     ----------
     source, target : PreparedCloud
-        Or whatever `prepare` takes as points; those are prepared with ``options.prepare``.
+        Or whatever `prepare` takes as points; those are prepared with the options.
     poses : (4, 4) or (K, 4, 4) array
         ``target_from_source`` of each pose, in the frames of source and target.
     refine : bool
@@ -73,7 +73,7 @@ def verify(
         raise ValueError(
             f"poses[{k}]: its last row is {matrices[k, 3].tolist()}, expected [0, 0, 0, 1]"
         )
-    first, second = prepared([source, target], options.prepare, context, False)
+    first, second = prepared([source, target], options, context, False)
     return _core.verify(context, first, second, matrices, options, refine, search_alternatives)
 
 

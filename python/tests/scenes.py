@@ -53,6 +53,6 @@ def error_of(result: gpureg.RegistrationResult, truth: np.ndarray) -> float:
 def few(count: int = 20000, voxel_size: float = 0.05) -> gpureg.RegistrationOptions:
     """The paper's sampling with few quadruples, refined: fast."""
     options = gpureg.RegistrationOptions.loopsmart(voxel_size)
-    options.quadruples.count = count
-    options.refine.max_iterations = 20
+    options.quadruples = count
+    options.refine_iterations = 20
     return options

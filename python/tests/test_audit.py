@@ -10,7 +10,7 @@ from gpureg import pose_graph
 from interrupts import ctrl_c
 from scenes import moved, pose, room
 
-OPTIONS = gpureg.RegistrationOptions.from_voxel_size(0.1, quality=2)
+OPTIONS = gpureg.RegistrationOptions(voxel_size=0.1, quality=2)
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +94,9 @@ def test_islands_are_judged_each_in_its_frame(two_rooms, tmp_path):
         gpureg.audit(two_rooms, tmp_path, options=OPTIONS)
     (tmp_path / "reconstruction.json").write_text(json.dumps(document))
     assert gpureg.audit(two_rooms, tmp_path, options=OPTIONS) == audit
-    located = gpureg.prepare_map(two_rooms, map, options=gpureg.MapOptions.from_voxel_size(0.1))
+    located = gpureg.prepare_map(two_rooms, map, options=gpureg.MapOptions(voxel_size=0.1))
     alone = gpureg.prepare_map(
-        two_rooms[:5], map.poses[:5], options=gpureg.MapOptions.from_voxel_size(0.1)
+        two_rooms[:5], map.poses[:5], options=gpureg.MapOptions(voxel_size=0.1)
     )
     assert np.array_equal(located.cloud.points, alone.cloud.points)
 
@@ -113,8 +113,8 @@ def test_a_wrong_scan_is_mended(scans):
 
 
 def test_the_audit_has_options(scans):
-    options = gpureg.AuditOptions.from_voxel_size(0.1)
-    assert options == gpureg.AuditOptions.from_voxel_size(0.1)
+    options = gpureg.AuditOptions()
+    assert options == gpureg.AuditOptions()
     wrong = poses()
     wrong[3, :3, 3] += [0.5, 0.4, 0.3]
     loose = options.replace(max_contradicted=1e-12)

@@ -42,7 +42,7 @@ def test_table_is_what_align_says(whole):
     assert whole.pairs == many.FRAGMENTS * (many.FRAGMENTS - 1) // 2 and whole.resumed == 0
     rows = whole.table().to_pylist()
     assert len({(row["i"], row["j"]) for row in rows}) == whole.pairs
-    clouds = gpureg.prepare_batch(many.fragments(), options=many.options().prepare)
+    clouds = gpureg.prepare_batch(many.fragments(), options=many.options())
     assert sum(row["status"] == "aligned" for row in rows) == whole.aligned > 100
     for row in random.Random(1).sample(rows, 25):
         result = gpureg.align(clouds[row["j"]], clouds[row["i"]], options=many.options())
@@ -297,7 +297,7 @@ def test_another_run_is_refused(source, tmp_path):
     clouds = [source[:500], source[500:1000], source[1000:1500]]
     gpureg.register_all(clouds, output=tmp_path, options=few(100, 0.1), progress=False)
     for change, message in [
-        ({"options": few(101, 0.1)}, "options.quadruples.count was 100, now 101"),
+        ({"options": few(101, 0.1)}, "options.quadruples was 100, now 101"),
         ({"options": few(100, 0.1), "pairs": [(0, 1)]}, "pair 0 2 is none of this run"),
     ]:
         with pytest.raises(ValueError, match=message):
@@ -406,11 +406,11 @@ class TestCommand:
         for k in range(5):
             gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", moved(whole[:: k + 1], pose(k)))
         options = gpureg.RegistrationOptions.loopsmart(0.06)
-        options.quadruples.count = 20000
+        options.quadruples = 20000
         self.compare(
             folder,
             tmp_path,
-            ["--preset", "loopsmart", "--set", "quadruples.count=20000", "--voxel-size", 0.06],
+            ["--preset", "loopsmart", "--set", "quadruples=20000", "--voxel-size", 0.06],
             options,
         )
 
@@ -420,7 +420,7 @@ class TestCommand:
             kitchen,
             tmp_path,
             ["--quality", 0],
-            gpureg.RegistrationOptions.from_voxel_size(0.05, quality=0),
+            gpureg.RegistrationOptions(voxel_size=0.05, quality=0),
         )
 
     def test_pair_map_and_place_are_the_command_s(self, tmp_path):
@@ -444,12 +444,12 @@ class TestCommand:
         result = gpureg.register(a, b, voxel_size)
         assert pair["target_from_source"] == result.target_from_source.ravel().tolist()
         assert pair["score"] == result.score
-        options = gpureg.RegistrationOptions.from_voxel_size(voxel_size)
+        options = gpureg.RegistrationOptions(voxel_size=voxel_size)
         made = gpureg.reconstruct(folder, options=options)
         assert made.islands == scene["islands"] == [[0, 1, 2, 3]]
         for scan, matrix in zip(scene["scans"], made.poses):
             assert scan["island_from_scan"] == matrix.ravel().tolist()
-        map_options = gpureg.MapOptions.from_voxel_size(voxel_size)
+        map_options = gpureg.MapOptions(voxel_size=voxel_size)
         place_map = gpureg.prepare_map(tmp_path / "map/map.ply", options=map_options)
         found = gpureg.locate(a, place_map)
         assert [entry["map_from_scan"] for entry in place["poses"]] == [

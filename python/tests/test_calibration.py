@@ -20,7 +20,7 @@ def mapped(confidence):
 
 
 def options(calibration=None):
-    out = gpureg.RegistrationOptions.from_voxel_size(0.1, 0)
+    out = gpureg.RegistrationOptions(voxel_size=0.1, quality=0)
     out.min_confidence = 0
     if calibration is not None:
         out.calibration = calibration
@@ -48,7 +48,7 @@ def test_the_calibration_is_a_function():
 def test_every_call_maps_its_confidences(clouds):
     a, b, c = clouds[0][:3]
     plain, scaled = options(), options(CALIBRATION)
-    source, target = gpureg.prepare_batch([a, b], options=plain.prepare)
+    source, target = gpureg.prepare_batch([a, b], options=plain)
     calls = {
         "register": lambda o: gpureg.register(a, b, options=o).score,
         "align": lambda o: gpureg.align(source, target, options=o).score,
@@ -193,7 +193,7 @@ def test_a_promised_risk(clouds, tmp_path):
     risk, pairs = document["risk"], document["decided_pairs"]
     assert risk["scans"] == 8 and risk["more_scans"] > 900 and "more_samples" not in risk
     assert len(document["clouds"]) == 8
-    assert document["options"]["prepare"]["voxel_size"] == pytest.approx(0.1)
+    assert document["options"]["voxel_size"] == pytest.approx(0.1)
     assert "seed" not in document["options"]
     again = gpureg.control_risk(
         *run.samples, scans=run.scans, scan_groups=run.scan_groups, max_risk=0.001
@@ -248,11 +248,9 @@ def test_bad_scans_are_named(arguments, error, message):
 
 
 def test_places_have_a_threshold_of_their_own():
-    options = gpureg.LocateOptions.from_voxel_size(0.1)
+    options = gpureg.LocateOptions(registration=gpureg.RegistrationOptions(voxel_size=0.1))
     options.registration.calibration = CALIBRATION
-    room = gpureg.prepare_map(
-        scenes.room(points=20000), options=gpureg.MapOptions.from_voxel_size(0.1)
-    )
+    room = gpureg.prepare_map(scenes.room(points=20000), options=gpureg.MapOptions(voxel_size=0.1))
     with pytest.raises(ValueError, match="registration.calibration is given"):
         gpureg.locate(scenes.room(points=2000), room, options=options)
 

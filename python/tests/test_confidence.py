@@ -52,7 +52,7 @@ def run_of(result, options, source, target):
     """The modes of one pair, as the script sees them."""
     run = fit_confidence.Run.__new__(fit_confidence.Run)
     run.evidence = fit_confidence.columns([evidence_of(mode) for mode in result.modes])
-    run.modes_per_pair, run.refined = np.array([len(result.modes)]), options.evidence.modes
+    run.modes_per_pair, run.refined = np.array([len(result.modes)]), 24
     run.factor = fit_confidence.overlap_factor(
         run.evidence["overlap"], len(source.points), len(target.points)
     )
@@ -76,7 +76,7 @@ def corner(seed, boxes, points):
 @pytest.mark.parametrize("name", MODELS)
 def test_the_shipped_coefficients_make_the_confidences(name):
     model, regressions = MODELS[name], model_header.read_header(HEADER)[name]
-    options = gpureg.RegistrationOptions.from_voxel_size(0.05)
+    options = gpureg.RegistrationOptions(voxel_size=0.05)
     options.min_confidence = 0
     if not model.free_space:
         options.prepare.depth_maps = 0
@@ -92,14 +92,12 @@ def test_the_shipped_coefficients_make_the_confidences(name):
     ):
         a, b = corner(seed, boxes, points), moved(corner(seed + 50, boxes, points), pose(seed))
         eye = np.array([[1.3, 1.4, 1.5]])
-        source = gpureg.prepare(a, viewpoints=eye, options=options.prepare)
+        source = gpureg.prepare(a, viewpoints=eye, options=options)
         there = moved(eye, pose(seed))
         if model.model:  # the normals say which side is outside
-            target = gpureg.prepare(
-                b, normals=there - b, viewpoints="model", options=options.prepare
-            )
+            target = gpureg.prepare(b, normals=there - b, viewpoints="model", options=options)
         else:
-            target = gpureg.prepare(b, viewpoints=there, options=options.prepare)
+            target = gpureg.prepare(b, viewpoints=there, options=options)
         result = gpureg.align(source, target, options=options)
         assert result.modes
         run = run_of(result, options, source, target)

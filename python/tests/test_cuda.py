@@ -34,7 +34,7 @@ def stays(value, **keywords):
         keywords.get("normals"),
         keywords.get("features"),
         None,
-        gpureg.PrepareOptions(),
+        gpureg.RegistrationOptions(),
         device=True,
     )
     return parts[5] is not None

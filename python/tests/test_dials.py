@@ -16,11 +16,11 @@ def clouds():
 
 
 def test_a_time_budget_gives_the_result_of_its_level(clouds):
-    options = gpureg.RegistrationOptions.from_voxel_size(0.05)
-    a, b = gpureg.prepare_batch(clouds, options=options.prepare)
+    options = gpureg.RegistrationOptions(voxel_size=0.05)
+    a, b = gpureg.prepare_batch(clouds, options=options)
     timed = gpureg.align_within(a, b, 1e6, options=options)
     assert timed.levels >= 2 and timed.milliseconds > 0
-    alone = gpureg.align(a, b, options=options.with_quality(timed.quality))
+    alone = gpureg.align(a, b, options=options.replace(quality=timed.quality))
     assert np.array_equal(timed.result.target_from_source, alone.target_from_source)
     assert timed.result.score == alone.score
     lowest = gpureg.align_within(a, b, 1e-3, options=options)

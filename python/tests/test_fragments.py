@@ -22,7 +22,7 @@ def test_folder(folder):
     fragments = gpureg.FragmentSet.from_directory(folder)
     assert fragments.numbers == (3, 4, 10) and len(fragments) == 3 and fragments.count == 11
     points, normals, features, viewpoints, origin, stream = fragments.load(
-        1, gpureg.PrepareOptions()
+        1, gpureg.RegistrationOptions()
     )
     assert points.shape == (100, 3) and normals is features is origin is stream is None
     assert viewpoints.tolist() == [[1, 2, 3]]
@@ -44,7 +44,7 @@ def named(tmp_path, source):
 def test_names_of_any_folder(named):
     fragments = gpureg.FragmentSet.from_directory(named)
     assert fragments.names == NAMES and fragments.numbers == (0, 1, 2, 3)
-    viewpoints = [fragments.load(k, gpureg.PrepareOptions())[3] for k in range(4)]
+    viewpoints = [fragments.load(k, gpureg.RegistrationOptions())[3] for k in range(4)]
     assert viewpoints[0] is viewpoints[3] is None
     assert viewpoints[2].tolist() == [[1, 2, 3]] and viewpoints[1].tolist() == [[4, 5, 6]]
     (named / "readme.md").write_text("")

@@ -34,7 +34,7 @@ def test_float_types_give_the_same_cloud(source, reference, dtype):
 @pytest.mark.parametrize("dtype", ["float16", "int8", "uint16", "int64"])
 def test_coarse_types_are_converted(source, dtype):
     points = (source * 8).astype(dtype)
-    options = gpureg.RegistrationOptions.from_voxel_size(0.4).prepare
+    options = gpureg.RegistrationOptions(voxel_size=0.4)
     assert same_points(
         gpureg.prepare(points, options=options),
         gpureg.prepare(points.astype("f4"), options=options),
@@ -385,7 +385,10 @@ def test_viewpoints_that_cannot_be_what_a_cloud_was_seen_from():
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # nobody asks them
         gpureg.prepare(
-            floor, normals=up, viewpoints=[[2, 2, -2]], options=gpureg.PrepareOptions(depth_maps=0)
+            floor,
+            normals=up,
+            viewpoints=[[2, 2, -2]],
+            options=gpureg.RegistrationOptions(prepare=gpureg.PrepareOptions(depth_maps=0)),
         )
     with pytest.warns(
         UserWarning,
@@ -424,7 +427,7 @@ class OnDevice:
 def test_every_array_on_the_device_has_its_own_stream():
     points, normals = OnDevice((5, 3), 11), OnDevice((5, 3), 22, 8192)
     features = OnDevice((5, 7), None, 16384)
-    options = gpureg.PrepareOptions()
+    options = gpureg.RegistrationOptions()
     whole = core_cloud(points, normals, features, None, options, device=True)
     assert [rows[0] for rows in whole[:3]] == [4096, 8192, 16384]
     assert whole[5] == (11, 22, 0), "without a stream it is the default stream"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scenes import moved, pose, room
 
-OPTIONS = gpureg.MapOptions.from_voxel_size(0.05)
+OPTIONS = gpureg.MapOptions(voxel_size=0.05)
 PLACES = [np.eye(4), np.eye(4)]
 PLACES[1][:3, 3] = [4, 1, 0]
 SENSOR = [1.8, 1.7, 1.6]
@@ -116,8 +116,8 @@ def test_options_may_change_while_a_call_runs(two_rooms: gpureg.PreparedMap) -> 
         return [result.scan_labels.tolist(), result.scan_probabilities.tolist()]
 
     calls: list[tuple[Callable[[Any], list[Any]], Any, str, float]] = [
-        (found, gpureg.LocateOptions.from_voxel_size(0.05), "min_confidence", 1.0),
-        (changed, gpureg.ChangeOptions.from_voxel_size(0.05), "tolerance", 5.0),
+        (found, gpureg.LocateOptions(), "min_confidence", 1.0),
+        (changed, gpureg.ChangeOptions(), "tolerance", 100.0),
     ]
     for call, options, field, value in calls:
         expected, results = call(options), []
@@ -167,7 +167,11 @@ def test_wrong_arguments(two_rooms: gpureg.PreparedMap) -> None:
     with pytest.raises(gpureg.InvalidArgument, match="millimetres"):
         gpureg.locate(scan * 1000, two_rooms)
     with pytest.raises(gpureg.InvalidArgument, match="voxel_size"):
-        gpureg.locate(scan, two_rooms, options=gpureg.LocateOptions.from_voxel_size(0.1))
+        gpureg.locate(
+            scan,
+            two_rooms,
+            options=gpureg.LocateOptions(registration=gpureg.RegistrationOptions(voxel_size=0.1)),
+        )
     with pytest.raises(TypeError, match="map: expected a PreparedMap"):
         gpureg.locate(scan, scan)
     with pytest.raises(TypeError, match="sequence of clouds"):

@@ -61,8 +61,13 @@ def test_a_host_that_optimises_gets_no_poses():
     assert np.array_equal(closer.poses[3], planar(1, 2, 3))
 
 
-@pytest.mark.parametrize("preset", ["from_voxel_size", "loopsmart"])
-def test_lengths_follow_the_voxel_size(preset):
+def at(voxel_size):
+    registration = gpureg.RegistrationOptions(voxel_size=voxel_size)
+    return gpureg.LoopClosureOptions(registration=registration)
+
+
+@pytest.mark.parametrize("options", [at, gpureg.LoopClosureOptions.loopsmart])
+def test_lengths_follow_the_voxel_size(options):
     """The noise of a host's loop without information is a voxel, 5 cm at 5 cm."""
 
     def noise(**keywords):
@@ -73,7 +78,6 @@ def test_lengths_follow_the_voxel_size(preset):
         (loop,) = closer.loops
         return loop.information[3, 3] ** -0.5
 
-    options = getattr(gpureg.LoopClosureOptions, preset)
     # The voxel size is a float32: 7 digits.
     assert noise() == pytest.approx(0.05, rel=1e-6)
     assert noise(voxel_size=0.2) == pytest.approx(0.2, rel=1e-6)
@@ -166,7 +170,7 @@ def test_clouds_that_do_not_fit_are_refused(closer, tmp_path):
     context = gpureg.Context.cpu(1)
     with pytest.raises(gpureg.InvalidArgument, match="fragment 3 has no points: of 9, 9 are not"):
         closer.add(3, np.full((9, 3), np.nan, np.float32))
-    coarse = gpureg.RegistrationOptions.from_voxel_size(0.5).prepare
+    coarse = gpureg.RegistrationOptions(voxel_size=0.5)
     with pytest.raises(gpureg.InvalidArgument, match=r"fragment 3 has voxels of 0.5 m.* 0.05 m"):
         closer.add(3, gpureg.prepare(points, options=coarse, context=context))
     closer.add(3, points)
@@ -191,10 +195,10 @@ def test_poses_of_a_session_are_its_odometry(closer):
 
 def test_points_are_added_and_graphs_returned_while_process_registers():
     """process() holds the engine of its context for most of a registration."""
-    options = gpureg.LoopClosureOptions.from_voxel_size(0.05)
-    registration = options.registration.with_quality(10)
-    registration.compatibility.triangles = 4096  # takes as long as some fifty calls
-    options.registration = registration
+    options = gpureg.LoopClosureOptions()
+    options.registration.quality = 10
+    # Takes as long as some fifty calls.
+    options.registration.tune = "compatibility.triangles=4096"
     closer = gpureg.LoopCloser(options=options, context=gpureg.Context.cpu(1))
     points = room(0)
     for k in range(2):

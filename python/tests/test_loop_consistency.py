@@ -16,7 +16,7 @@ def loop():
     clouds = [points[0::3], moved(points[1::3], pose(4)), moved(points[2::3], pose(5))]
     pairs = [(0, 1), (1, 2), (0, 2)]
     return pairs, gpureg.align_batch(
-        clouds, pairs, options=gpureg.RegistrationOptions.from_voxel_size(0.05)
+        clouds, pairs, options=gpureg.RegistrationOptions(voxel_size=0.05)
     )
 
 
@@ -47,8 +47,8 @@ def test_without_loops_scores_stay(loop):
 
 def test_options(loop):
     pairs, results = loop
-    options = gpureg.LoopConsistencyOptions.from_voxel_size(0.1)
-    assert options.closing_distance == pytest.approx(0.3)
+    options = gpureg.LoopConsistencyOptions(voxel_size=0.1)
+    assert options.closing_distance == 3
     assert len(gpureg.loop_consistency(pairs, results, options=options)) == 3
     with pytest.raises(gpureg.InvalidArgument, match="iterations is 0"):
         gpureg.loop_consistency(pairs, results, options=options.replace(iterations=0))

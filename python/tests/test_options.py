@@ -10,10 +10,6 @@ import pytest
 
 CLASSES = [
     gpureg.PrepareOptions,
-    gpureg.CompatibilityOptions,
-    gpureg.QuadrupleOptions,
-    gpureg.RefineOptions,
-    gpureg.EvidenceOptions,
     gpureg.RegistrationOptions,
     gpureg.LoopConsistencyOptions,
     gpureg.ReconstructionOptions,
@@ -43,11 +39,12 @@ def test_common_face(cls):
     [
         (
             gpureg.PrepareOptions,
-            "voxel_size",
+            "normal_radius",
             "a",
-            "PrepareOptions.voxel_size: expected a number, got 'a'",
+            "PrepareOptions.normal_radius: expected a number, got 'a'",
         ),
-        (gpureg.PrepareOptions, "voxel_size", True, "expected a number, got True"),
+        (gpureg.RegistrationOptions, "voxel_size", True, "expected a number, got True"),
+        (gpureg.RegistrationOptions, "tune", 5, "tune: expected a text, got 5"),
         (
             gpureg.RegistrationOptions,
             "method",
@@ -55,14 +52,19 @@ def test_common_face(cls):
             "method: expected 'compatibility' or 'quadruples', got 'luck'",
         ),
         (
-            gpureg.QuadrupleOptions,
-            "count",
+            gpureg.RegistrationOptions,
+            "quadruples",
             -1,
-            "count: expected a whole number from 0 to 4294967295, got -1",
+            "quadruples: expected a whole number from 0 to 4294967295, got -1",
         ),
-        (gpureg.QuadrupleOptions, "count", 2.5, "whole number"),
+        (gpureg.RegistrationOptions, "quadruples", 2.5, "whole number"),
         (gpureg.RegistrationOptions, "seed", 2**64, "whole number from 0 to 18446744073709551615"),
-        (gpureg.QuadrupleOptions, "mutual", "yes", "mutual: expected True or False, got 'yes'"),
+        (
+            gpureg.PrepareOptions,
+            "downsample",
+            "yes",
+            "downsample: expected True or False, got 'yes'",
+        ),
         (
             gpureg.RegistrationOptions,
             "prepare",
@@ -78,7 +80,6 @@ def test_wrong_values_are_named(cls, field, value, message):
         setattr(cls(), field, value)
 
 
-FROM = gpureg.RegistrationOptions.from_voxel_size
 POINTS = [[0, 0, 0]]
 
 
@@ -86,47 +87,19 @@ POINTS = [[0, 0, 0]]
     ("call", "error", "message"),
     [
         (
-            lambda: FROM(0.05, -1),
-            ValueError,
-            "quality: expected a whole number from 0 to 10, got -1",
-        ),
-        (
-            lambda: FROM(0.05, 2.5),
-            TypeError,
-            "quality: expected a whole number from 0 to 10, got 2.5",
-        ),
-        (lambda: FROM([0.05]), TypeError, r"voxel_size: expected a number, got \[0.05\]"),
-        (lambda: FROM(True), TypeError, "voxel_size: expected a number, got True"),
-        (lambda: FROM(np.bool_(True)), TypeError, "voxel_size: expected a number, got (np.)?True"),
-        (
-            lambda: FROM(list(range(10000))),
-            TypeError,
-            r"voxel_size: expected a number, got \[0, 1, .{1,80}\.\.\.",
-        ),
-        (
-            lambda: gpureg.RegistrationOptions().with_quality("5"),
-            TypeError,
-            "quality: expected .*, got '5'",
-        ),
-        (
             lambda: gpureg.RegistrationOptions.loopsmart("5"),
             TypeError,
             "voxel_size: expected a number, got '5'",
         ),
         (
-            lambda: gpureg.LoopConsistencyOptions.from_voxel_size(None),
+            lambda: gpureg.RegistrationOptions(0.05),
             TypeError,
-            "voxel_size: expected a number, got None",
-        ),
-        (
-            lambda: gpureg.PrepareOptions(0.05),
-            TypeError,
-            r"PrepareOptions: expected keywords, such as PrepareOptions\(voxel_size=...\), got 0.05",
+            r"RegistrationOptions: expected keywords, such as RegistrationOptions\(voxel_size=...\), got 0.05",
         ),
         (
             lambda: gpureg.register(POINTS, POINTS, quality=-1),
             ValueError,
-            "quality: expected .*, got -1",
+            "quality is -1, expected 0 or more",
         ),
         (
             lambda: gpureg.register(POINTS, POINTS, [0.05]),
@@ -137,6 +110,11 @@ POINTS = [[0, 0, 0]]
             lambda: gpureg.register(POINTS, POINTS, np.ones(2)),
             TypeError,
             r"voxel_size: expected a number, got array\(\[1., 1.\]\)",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, quality=2.5),
+            TypeError,
+            "quality: expected a whole number, got 2.5",
         ),
         (
             lambda: gpureg.register(POINTS, POINTS, True),
@@ -222,42 +200,33 @@ def test_wrong_arguments_are_named_in_one_line(call, error, message):
 
 
 def test_numbers_are_as_written():
-    assert gpureg.PrepareOptions(voxel_size=0.1).voxel_size == 0.1
+    assert gpureg.RegistrationOptions(voxel_size=0.1).voxel_size == 0.1
     assert gpureg.RegistrationOptions(seed=2**64 - 1).seed == 2**64 - 1
     numpy = pytest.importorskip("numpy")
-    assert gpureg.QuadrupleOptions(count=numpy.int32(7)).count == 7
-    assert gpureg.PrepareOptions(voxel_size=numpy.float32(0.1)).voxel_size == 0.1
+    assert gpureg.RegistrationOptions(quadruples=numpy.int32(7)).quadruples == 7
+    assert gpureg.RegistrationOptions(voxel_size=numpy.float32(0.1)).voxel_size == 0.1
 
 
 def test_nested_options_are_the_same_object():
     options = gpureg.RegistrationOptions()
-    options.quadruples.count = 7
-    assert options.quadruples.count == 7
+    options.prepare.depth_maps = 7
+    assert options.prepare.depth_maps == 7
     assert options != gpureg.RegistrationOptions()
-    options.quadruples = gpureg.QuadrupleOptions(count=9)
-    assert options.quadruples.count == 9
+    options.prepare = gpureg.PrepareOptions(depth_maps=9)
+    assert options.prepare.depth_maps == 9
 
 
 def test_presets():
-    options = gpureg.RegistrationOptions.from_voxel_size(0.1)
-    assert (
-        options.prepare.normal_radius == 0.2 and options.prepare.max_correspondence_distance == 0.15
-    )
-    assert gpureg.RegistrationOptions.from_voxel_size(0.05) == gpureg.RegistrationOptions()
+    paper = gpureg.RegistrationOptions.loopsmart(0.1)
+    assert paper.voxel_size == 0.1
+    assert paper.prepare.normal_radius == 2 and paper.prepare.max_correspondence_distance == 1.5
+    assert paper.method == "quadruples" and paper.refine_iterations == 0
     assert gpureg.RegistrationOptions().method == "compatibility"
-    assert gpureg.RegistrationOptions.loopsmart().method == "quadruples"
-    assert gpureg.RegistrationOptions.loopsmart().refine.max_iterations == 0
-    assert gpureg.RegistrationOptions.loopsmart(0.1).prepare.voxel_size == 0.1
 
 
 def test_options_of_maps_and_loops():
-    maps = gpureg.ReconstructionOptions.from_voxel_size(0.1)
-    assert maps.consistency == gpureg.LoopConsistencyOptions.from_voxel_size(0.1)
-    # 0.1 is a float in C++: seven digits.
-    assert maps.noise.translation == pytest.approx(0.06, rel=1e-6)
-    loops = gpureg.LoopClosureOptions.from_voxel_size(0.1)
-    assert loops.registration == gpureg.RegistrationOptions.from_voxel_size(0.1)
-    assert loops.proposals.coarse_voxel_size == pytest.approx(1, rel=1e-6)
+    loops = gpureg.LoopClosureOptions(registration=gpureg.RegistrationOptions(voxel_size=0.1))
+    assert loops.proposals.coarse_voxel_size == 10
     loops.graph.drift.translation_per_metre = 0.5
     assert loops.graph.drift == gpureg.DriftOptions(translation_per_metre=0.5)
     assert gpureg.LoopClosureOptions.loopsmart().graph.robust == "line_process"
@@ -268,12 +237,14 @@ def test_options_of_maps_and_loops():
     with pytest.raises(TypeError, match="options: expected a LoopClosureOptions"):
         gpureg.LoopCloser(options=gpureg.RegistrationOptions())
     assert gpureg.PoseEvidence.source_overlap.__doc__.startswith("Share of the source's points")
-    assert gpureg.PrepareOptions.voxel_size.__doc__.endswith("as they are. Metres, or 0.")
+    assert gpureg.PrepareOptions.normal_radius.__doc__.endswith("feature_radius. Voxels.")
 
 
 def test_out_of_range_is_a_value_error():
-    with pytest.raises(ValueError, match="prepare.voxel_size is nan"):
-        gpureg.PrepareOptions(voxel_size=float("nan")).validate()
+    with pytest.raises(ValueError, match="prepare.normal_radius is nan"):
+        gpureg.PrepareOptions(normal_radius=float("nan")).validate()
+    with pytest.raises(ValueError, match="quality is 11, expected at most 10"):
+        gpureg.RegistrationOptions(quality=11).validate()
     with pytest.raises(gpureg.InvalidArgument, match="voxel_size"):
         gpureg.register([[0, 0, 0]], [[0, 0, 0]], voxel_size=-1)
     with pytest.raises(gpureg.Error):

@@ -24,7 +24,7 @@ def test_descriptor_belongs_to_the_place_not_to_the_pose():
 def test_same_candidates_again():
     clouds, _ = make_fragments(30, seed=2)
     fragments = gpureg.FragmentSet.from_clouds(clouds)
-    nearest = pruning.Nearest(k=4, options=few(1, 0.12).prepare)
+    nearest = pruning.Nearest(k=4, options=few(1, 0.12))
     first = nearest(fragments)
     assert nearest.seconds > 0 and np.array_equal(first, nearest(fragments))
     assert (first[:, 0] < first[:, 1]).all()
@@ -32,9 +32,7 @@ def test_same_candidates_again():
 
 def test_most_overlapping_pairs_are_kept():
     clouds, overlapping = make_fragments(120, seed=1)
-    pairs = pruning.Nearest(k=12, options=few(1, 0.12).prepare)(
-        gpureg.FragmentSet.from_clouds(clouds)
-    )
+    pairs = pruning.Nearest(k=12, options=few(1, 0.12))(gpureg.FragmentSet.from_clouds(clouds))
     report = pruning.measure(pairs, overlapping, len(clouds))
     # Twelve of 119 at random would keep less than a fifth.
     assert report.tried < 0.2 * report.pairs and report.recall > 0.7
@@ -60,7 +58,7 @@ def test_as_the_pairs_of_a_run(tmp_path):
     options = few(2000, 0.12)
     run = gpureg.register_all(
         clouds,
-        pruning.Nearest(k=3, options=options.prepare),
+        pruning.Nearest(k=3, options=options),
         output=tmp_path,
         options=options,
         progress=False,

@@ -103,7 +103,7 @@ def test_either_goes_on_where_the_other_stopped(whole, tmp_path):
 def test_progress_moves_within_a_chunk(tmp_path):
     seen = []
     long = few(4_000_000, 0.08)
-    long.quadruples.max_survivors = 2**18
+    long.tune = "quadruples.max_survivors=262144"
     gpureg.ray.register_all(
         many.fragments()[:9],
         output=tmp_path,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scenes import moved, pose, room
 
-OPTIONS = gpureg.RegistrationOptions.from_voxel_size(0.1, quality=2)
+OPTIONS = gpureg.RegistrationOptions(voxel_size=0.1, quality=2)
 
 
 @pytest.fixture(scope="module")

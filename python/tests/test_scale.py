@@ -87,7 +87,7 @@ def test_wrong_types_are_named(scale):
 def test_scale_with_prior_is_refused():
     with pytest.raises(TypeError, match="scale"):
         gpureg.register(_room(1), _room(2), 0.1, scale="free", time_budget_ms=5)
-    with pytest.raises(gpureg.InvalidArgument, match="voxel_size"):
-        options = gpureg.RegistrationOptions.from_voxel_size(0.1)
-        options.prepare.voxel_size = 0
+    with pytest.raises(gpureg.InvalidArgument, match="downsample"):
+        options = gpureg.RegistrationOptions(voxel_size=0.1)
+        options.prepare.downsample = False
         gpureg.register(_room(1), _room(2), options=options, scale="free")

@@ -18,9 +18,9 @@ import gpureg, numpy as np
 from scenes import moved, pose, room
 
 context = gpureg.Context.cpu(2)
-options = gpureg.RegistrationOptions.from_voxel_size(0.08)
+options = gpureg.RegistrationOptions(voxel_size=0.08)
 points = room(points=3000)
-a, b = gpureg.prepare_batch([points, moved(points, pose())], options=options.prepare, context=context)
+a, b = gpureg.prepare_batch([points, moved(points, pose())], options=options, context=context)
 calls = {
     "align": lambda: gpureg.align(a, b, options=options, context=context),
     "align_batch": lambda: gpureg.align_batch([a, b], [(0, 1)] * 2, options=options, context=context),
@@ -30,13 +30,10 @@ calls = {
 done = threading.Event()
 
 def write():
-    evidence, compatibility = options.evidence, options.compatibility
     while not done.is_set():
         for large in [False, True] * 1000:
-            evidence.modes = 64 if large else 1
-            compatibility.max_members = 1024 if large else 3
-            compatibility.max_matches = 65536 if large else 4
-            compatibility.seeds = 4096 if large else 1
+            options.quality = 10 if large else 0
+            options.tune = "compatibility.max_members=1024 evidence.modes=64" if large else ""
 
 thread = threading.Thread(target=write)
 thread.start()
@@ -91,14 +88,18 @@ def slow():
     """
     cpu = gpureg.Context.cpu(2)
     quadruples = few(1 << 28, 0.02)
-    most = gpureg.RegistrationOptions.from_voxel_size(0.02)
-    compatibility, evidence = most.compatibility, most.evidence
-    compatibility.seeds, compatibility.triangles, compatibility.max_members = 8192, 4096, 1024
-    compatibility.max_matches, evidence.modes, evidence.sample = 65536, 64, 65536
-    a, b = gpureg.prepare_batch(
-        [room(seed, points=30_000) for seed in (1, 2)], options=most.prepare, context=cpu
+    most = gpureg.RegistrationOptions(
+        voxel_size=0.02,
+        quality=10,
+        tune="compatibility.triangles=4096 compatibility.max_members=1024 "
+        "compatibility.max_matches=65536 evidence.sample=65536",
     )
-    kept = gpureg.PrepareOptions(voxel_size=0, feature_radius=0.5, normal_radius=0.5)
+    a, b = gpureg.prepare_batch(
+        [room(seed, points=30_000) for seed in (1, 2)], options=most, context=cpu
+    )
+    kept = gpureg.RegistrationOptions(
+        prepare=gpureg.PrepareOptions(downsample=False, feature_radius=10, normal_radius=10)
+    )
     large = room(points=120_000)
     return {
         "align": lambda: gpureg.align(a, b, options=most, context=cpu),
@@ -109,7 +110,7 @@ def slow():
         "verify": lambda: gpureg.verify(a, b, np.eye(4), options=most, context=cpu),
         "prepare": lambda: gpureg.prepare(large, options=kept, context=cpu),
         "register": lambda: gpureg.register(
-            large, large, options=most.replace(prepare=kept), context=cpu
+            large, large, options=most.replace(voxel_size=0.05, prepare=kept.prepare), context=cpu
         ),
     }
 

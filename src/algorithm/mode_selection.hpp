@@ -5,7 +5,7 @@
 
 #include "algorithm/evidence.hpp"
 #include "common/limits.hpp"
-#include "gpureg/options.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg {
 
@@ -37,14 +37,14 @@ constexpr float kLeastShareOfBest = 0.1f;
 constexpr std::uint32_t kCertainFirst = 16, kCertainSecond = 6;
 
 /// Host only. The modes of the first refinement.
-inline ModeSelection first_selection(const EvidenceOptions& options) {
+inline ModeSelection first_selection(const EvidenceSettings& options) {
   return {mode_limits(options.mode_angle, options.mode_distance, 1.0f),
           std::min(kRefinedPerMode * options.modes, limits::kMaxModes), kCertainFirst, kLeastScore,
           0.0f};
 }
 
 /// Host only. The modes of the second refinement, by their scores after the first.
-inline ModeSelection second_selection(const EvidenceOptions& options) {
+inline ModeSelection second_selection(const EvidenceSettings& options) {
   return {mode_limits(options.mode_angle, options.mode_distance, kRoughMerge), options.modes,
           kCertainSecond, kLeastScore, kLeastShareOfBest};
 }
@@ -55,7 +55,7 @@ constexpr std::uint32_t kRoughIterations = 10;
 constexpr std::uint32_t kFinalIterations = 3;
 
 /// Points of the source in a refinement on a sample, approximately.
-inline std::uint32_t refinement_sample(const EvidenceOptions& options) {
+inline std::uint32_t refinement_sample(const EvidenceSettings& options) {
   return 2 * options.sample;
 }
 

@@ -92,7 +92,7 @@ GPUREG_HD bool turns_back(std::uint32_t facing_away, std::uint32_t points) {
 }
 
 /// True where input normals may be flipped: normals and viewpoints are given, and the evidence uses
-/// viewpoints (PrepareOptions::depth_maps). Host only.
+/// viewpoints (PrepareSettings::depth_maps). Host only.
 inline bool turns_normals(bool has_normals, std::size_t viewpoints, std::uint32_t depth_maps) {
   return has_normals && viewpoints > 0 && depth_maps > 0;
 }

@@ -19,7 +19,7 @@ struct AlignedPair {
   const PreparedState& source;
   const PreparedState& target;
   bool swapped;  ///< the engine moved the target
-  const RegistrationOptions& options;
+  const RegistrationSettings& options;
 
   bool flat() const { return planar_pair(source, target); }
 

@@ -14,7 +14,7 @@
 namespace gpureg {
 
 Batch::Batch(Engine& engine, const std::vector<PairVariant>& variants,
-             const std::vector<RegistrationPrior>& priors, const RegistrationOptions& options,
+             const std::vector<RegistrationPrior>& priors, const RegistrationSettings& options,
              const BatchCallbacks& callbacks, std::size_t pairs)
     : engine_(engine),
       variants_(variants),

@@ -16,7 +16,7 @@ class Batch {
   /// @param variants of the pairs 0 to pairs - 1, in that order.
   /// @param priors of the pairs, or none.
   Batch(Engine& engine, const std::vector<PairVariant>& variants,
-        const std::vector<RegistrationPrior>& priors, const RegistrationOptions& options,
+        const std::vector<RegistrationPrior>& priors, const RegistrationSettings& options,
         const BatchCallbacks& callbacks, std::size_t pairs);
 
   /// The results of all pairs. Rethrows what the engine or a callback throws, the error of the
@@ -42,7 +42,7 @@ class Batch {
   Engine& engine_;
   const std::vector<PairVariant>& variants_;
   const std::vector<RegistrationPrior>& priors_;
-  const RegistrationOptions& options_;
+  const RegistrationSettings& options_;
   const BatchCallbacks& callbacks_;
   std::size_t next_ = 0;  ///< variant that the next chunk starts with
   std::vector<RegistrationResult> results_;

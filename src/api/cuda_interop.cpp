@@ -9,6 +9,7 @@
 #include "api/raw_cloud.hpp"
 #include "common/in_halves.hpp"
 #include "pipeline/device_engine.hpp"
+#include "settings/resolve.hpp"
 #include "viewpoint/unknown_viewpoint.hpp"
 
 namespace gpureg {
@@ -20,12 +21,12 @@ struct AdoptedBatch {
   std::vector<std::shared_ptr<AdoptedCloud>> clouds;
   std::vector<std::array<double, 3>> origins;
   std::vector<CloudKnowledge> knowledge;
-  PrepareOptions options;
+  PrepareSettings options;
   std::vector<std::string> names;
 };
 
 AdoptedBatch adopt(const Context& context, const std::vector<DevicePointCloudView>& clouds,
-                   const PrepareOptions& options, const std::vector<CudaStream>& streams,
+                   const PrepareSettings& options, const std::vector<CudaStream>& streams,
                    const std::vector<std::string>& names) {
   options.validate();
   check_names(names, clouds.size());
@@ -97,19 +98,21 @@ std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
 }  // namespace
 
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
-                                         const PrepareOptions& options, CudaStream stream) {
-  return std::async(std::launch::async, [batch = adopt(context, {cloud}, options, {stream}, {})] {
-    return prepared(batch).front();
-  });
+                                         const RegistrationOptions& options, CudaStream stream) {
+  return std::async(std::launch::async,
+                    [batch = adopt(context, {cloud}, resolve(options).prepare, {stream}, {})] {
+                      return prepared(batch).front();
+                    });
 }
 
 std::future<std::vector<PreparedCloud>> prepare_batch_async(
     const Context& context, const std::vector<DevicePointCloudView>& clouds,
-    const PrepareOptions& options, const std::vector<CudaStream>& streams,
+    const RegistrationOptions& options, const std::vector<CudaStream>& streams,
     const std::vector<std::string>& names) {
-  return std::async(std::launch::async, [batch = adopt(context, clouds, options, streams, names)] {
-    return prepared(batch);
-  });
+  return std::async(std::launch::async,
+                    [batch = adopt(context, clouds, resolve(options).prepare, streams, names)] {
+                      return prepared(batch);
+                    });
 }
 
 }  // namespace gpureg

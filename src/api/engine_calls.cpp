@@ -25,7 +25,7 @@ constexpr std::uint32_t kPlanarRounds = 2, kPlanarIterations = 2;
 /// The modes of all pairs are those of the poses, in their order.
 std::vector<PairOutcome> verify_in_parts(Engine& engine, const std::vector<PairInput>& pairs,
                                          const std::vector<Poses>& poses,
-                                         const RegistrationOptions& options, bool refine) {
+                                         const RegistrationSettings& options, bool refine) {
   std::vector<PairOutcome> out(pairs.size());
   std::size_t most = 0;
   for (const Poses& of_pair : poses) most = std::max(most, of_pair.size());
@@ -75,7 +75,7 @@ double milliseconds_since(std::chrono::steady_clock::time_point begin) {
 
 /// Moves the modes of 2-D scans to poses in the plane, with the evidence of these. A pose that
 /// drifted out of it loses points that the projected one has.
-void keep_in_plane(Engine& engine, Span<const PairInput> all, const RegistrationOptions& options,
+void keep_in_plane(Engine& engine, Span<const PairInput> all, const RegistrationSettings& options,
                    Span<PairOutcome> outcomes) {
   std::vector<PairInput> pairs;
   std::vector<PairOutcome*> kept;
@@ -90,7 +90,7 @@ void keep_in_plane(Engine& engine, Span<const PairInput> all, const Registration
   if (pairs.empty()) return;
 
   const auto begin = std::chrono::steady_clock::now();
-  RegistrationOptions few = options;
+  RegistrationSettings few = options;
   few.refine.max_iterations = std::min(kPlanarIterations, options.refine.max_iterations);
   const std::uint32_t first = 0;  // a match, so that none are searched; their evidence is not used
   std::vector<PairInput> unmatched = pairs;
@@ -123,7 +123,7 @@ void keep_in_plane(Engine& engine, Span<const PairInput> all, const Registration
 
 }  // namespace
 
-void align_all(Engine& engine, Span<const PairInput> pairs, const RegistrationOptions& options,
+void align_all(Engine& engine, Span<const PairInput> pairs, const RegistrationSettings& options,
                Span<PairOutcome> outcomes) {
   in_halves(0, pairs.size, [&](std::size_t begin, std::size_t end) {
     // A larger part that failed may have left some of its outcomes.
@@ -135,7 +135,7 @@ void align_all(Engine& engine, Span<const PairInput> pairs, const RegistrationOp
 
 std::vector<PairOutcome> verify_all(Engine& engine, const std::vector<PairInput>& pairs,
                                     const std::vector<Poses>& poses,
-                                    const RegistrationOptions& options, bool refine) {
+                                    const RegistrationSettings& options, bool refine) {
   std::vector<PairOutcome> out = verify_in_parts(engine, pairs, poses, options, refine);
   if (refine) keep_in_plane(engine, span_of(pairs), options, {out.data(), out.size()});
   return out;

@@ -10,12 +10,12 @@
 namespace gpureg {
 
 /// Aligns all pairs.
-void align_all(Engine& engine, Span<const PairInput> pairs, const RegistrationOptions& options,
+void align_all(Engine& engine, Span<const PairInput> pairs, const RegistrationSettings& options,
                Span<PairOutcome> outcomes);
 
 /// Verifies given poses of the pairs; refine: they are refined before.
 std::vector<PairOutcome> verify_all(Engine& engine, const std::vector<PairInput>& pairs,
                                     const std::vector<std::vector<Pose<double>>>& poses,
-                                    const RegistrationOptions& options, bool refine);
+                                    const RegistrationSettings& options, bool refine);
 
 }  // namespace gpureg

@@ -4,9 +4,9 @@
 #include <Eigen/Geometry>
 
 #include "algorithm/evidence.hpp"
-#include "gpureg/options.hpp"
 #include "gpureg/result.hpp"
 #include "pipeline/engine.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg {
 
@@ -24,7 +24,7 @@ inline Eigen::Vector3d middle_of(const CorrespondenceMoments& m, const Eigen::Ve
 /// (same_mode()), which a stray point may place far from the cloud. middle: in the frame of the
 /// source.
 inline bool same_mode_at(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
-                         const Eigen::Vector3d& middle, const EvidenceOptions& options) {
+                         const Eigen::Vector3d& middle, const EvidenceSettings& options) {
   return (a.linear().transpose() * b.linear()).trace() >=
              static_cast<double>(mode_trace(options.mode_angle)) &&
          (a * middle - b * middle).norm() <= static_cast<double>(options.mode_distance);

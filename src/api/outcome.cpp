@@ -20,7 +20,7 @@ constexpr double kWorthTesting = 0.05;
 constexpr std::uint32_t kLargestSymmetric = 200'000;
 
 RegistrationReason evidence_reason(const RegistrationResult& result, bool contradicted,
-                                   const RegistrationOptions& options) {
+                                   const RegistrationSettings& options) {
   const RegistrationStatistics& s = result.statistics;
   if (s.source_points < limits::kMinMatches) return RegistrationReason::too_few_source_points;
   if (s.target_points < limits::kMinMatches) return RegistrationReason::too_few_target_points;
@@ -35,7 +35,8 @@ RegistrationReason evidence_reason(const RegistrationResult& result, bool contra
   return options.accept_symmetry ? RegistrationReason::none : RegistrationReason::symmetric;
 }
 
-RegistrationStatus status_of(const RegistrationResult& result, const RegistrationOptions& options) {
+RegistrationStatus status_of(const RegistrationResult& result,
+                             const RegistrationSettings& options) {
   if (result.reason != RegistrationReason::none) return RegistrationStatus::not_aligned;
   return result.score >= options.min_confidence ? RegistrationStatus::aligned
                                                 : RegistrationStatus::aligned_up_to_symmetry;
@@ -162,7 +163,7 @@ class Modes {
 
   const PairOutcome& outcome_;
   const AlignedPair& pair_;
-  const RegistrationOptions& options_;
+  const RegistrationSettings& options_;
   std::map<std::uint32_t, std::size_t> origins_;  ///< first mode of each origin mode
   std::vector<RegistrationMode> modes_;
   Eigen::Vector3d middle_;  ///< centre of the source points in correspondences

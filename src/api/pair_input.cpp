@@ -17,7 +17,7 @@ void check_dimensions(const PreparedState& source, const PreparedState& target) 
 }  // namespace
 
 const PreparedState* checked_state(const Context& context, const PreparedCloud& cloud,
-                                   const RegistrationOptions& options, const std::string& name) {
+                                   const RegistrationSettings& options, const std::string& name) {
   if (!cloud.valid())
     throw InvalidArgument(name + " is an empty handle: it was not made by prepare()");
   const PreparedState& state = *Access::state(cloud);
@@ -33,7 +33,7 @@ const PreparedState* checked_state(const Context& context, const PreparedCloud& 
 }
 
 void check_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
-                 const std::vector<Pair>& pairs, const RegistrationOptions& options,
+                 const std::vector<Pair>& pairs, const RegistrationSettings& options,
                  bool by_features) {
   std::vector<std::uint8_t> used(clouds.size(), 0);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
@@ -51,7 +51,7 @@ void check_pairs(const Context& context, const std::vector<PreparedCloud>& cloud
 }
 
 bool swaps(const PreparedState& source, const PreparedState& target,
-           const RegistrationOptions& options) {
+           const RegistrationSettings& options) {
   return options.smaller_as_source && target.size < source.size;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "gpureg/registration.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg {
 
@@ -13,6 +14,6 @@ namespace gpureg {
 std::vector<PreparedCloud> prepare_copies(const Context& context,
                                           const std::vector<PointCloudView>& copies,
                                           const std::vector<double>& scales,
-                                          const PrepareOptions& options);
+                                          const PrepareSettings& options);
 
 }  // namespace gpureg

@@ -26,7 +26,10 @@ std::vector<Eigen::Vector3f> to_eigen(const std::vector<Vec3>& v, const float* s
 std::size_t PreparedCloud::size() const { return checked(state_).size; }
 std::size_t PreparedCloud::feature_dimension() const { return checked(state_).feature_dimension; }
 const PrepareStatistics& PreparedCloud::statistics() const { return checked(state_).statistics; }
-const PrepareOptions& PreparedCloud::options() const { return checked(state_).options; }
+const PrepareSettings& PreparedCloud::settings() const { return checked(state_).options; }
+float PreparedCloud::voxel_size() const {
+  return settings().voxel_size > 0 ? settings().voxel_size : settings().unit;
+}
 Eigen::Vector3d PreparedCloud::origin() const {
   return Eigen::Map<const Eigen::Vector3d>(checked(state_).frame_offset);
 }

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "gpureg/time_budget.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg {
 
@@ -16,13 +17,13 @@ struct LevelRunner {
 /// Loop of align_within(). options: thresholds of equal poses, and the numbers of candidates per
 /// level.
 TimedResult run_levels(const LevelRunner& runner, double milliseconds,
-                       const RegistrationOptions& options);
+                       const RegistrationSettings& options);
 
 /// Predicted milliseconds of a level from the stages of another one: matching grows with the
 /// matches, proposals grow with seeds and triangles, refinement and verification with the modes.
 /// overhead: milliseconds of the call outside its stages.
 double predicted_milliseconds(const StageTimings& measured, double overhead,
-                              const RegistrationOptions& measured_options,
-                              const RegistrationOptions& options);
+                              const RegistrationSettings& measured_options,
+                              const RegistrationSettings& options);
 
 }  // namespace gpureg

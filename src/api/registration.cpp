@@ -14,6 +14,7 @@
 #include "api/prepare_copies.hpp"
 #include "api/raw_cloud.hpp"
 #include "api/variants.hpp"
+#include "api/with_settings.hpp"
 #include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
@@ -28,7 +29,7 @@ namespace gpureg {
 namespace {
 
 void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pairs,
-                  const RegistrationOptions& options) {
+                  const RegistrationSettings& options) {
   if (priors.empty()) return;
   if (priors.size() != pairs)
     throw InvalidArgument("priors has " + std::to_string(priors.size()) +
@@ -49,7 +50,7 @@ struct OwnedRows {
   WithoutRangeShells seen;
   Extruded extruded;
   WithoutStrayPoints kept;
-  OwnedRows(const RawCloud& raw, const CloudKnowledge& known, const PrepareOptions& options)
+  OwnedRows(const RawCloud& raw, const CloudKnowledge& known, const PrepareSettings& options)
       : seen(raw, options.keep_range_limits || !has_sensor_frame(known)),
         extruded(seen.cloud(), known.model, options),
         kept(extruded.cloud(), options) {}
@@ -62,7 +63,7 @@ struct OwnedRows {
 /// @return the owners of the rows.
 template <typename Naming>
 std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
-                                                   const PrepareOptions& options,
+                                                   const PrepareSettings& options,
                                                    const Naming& naming,
                                                    std::vector<CloudKnowledge>& knowledge,
                                                    std::vector<RawCloud>& raw) {
@@ -89,7 +90,7 @@ std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
 /// @param scales of copies of one cloud that are for matches alone, or none.
 std::vector<PreparedCloud> prepare_all(const Context& context,
                                        const std::vector<PointCloudView>& clouds,
-                                       const PrepareOptions& options,
+                                       const PrepareSettings& options,
                                        const std::vector<std::string>& names,
                                        const std::vector<double>& scales) {
   options.validate();
@@ -148,7 +149,7 @@ std::vector<PreparedCloud> prepare_all(const Context& context,
 
 std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const std::vector<PointCloudView>& clouds,
-                                         const PrepareOptions& options,
+                                         const PrepareSettings& options,
                                          const std::vector<std::string>& names) {
   return prepare_all(context, clouds, options, names, {});
 }
@@ -156,34 +157,66 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
 std::vector<PreparedCloud> prepare_copies(const Context& context,
                                           const std::vector<PointCloudView>& copies,
                                           const std::vector<double>& scales,
-                                          const PrepareOptions& options) {
+                                          const PrepareSettings& options) {
   return prepare_all(context, copies, options, {}, scales);
 }
 
+std::vector<PreparedCloud> prepare_batch(const Context& context,
+                                         const std::vector<PointCloudView>& clouds,
+                                         const RegistrationOptions& options,
+                                         const std::vector<std::string>& names) {
+  return prepare_batch(context, clouds, resolve(options).prepare, names);
+}
+
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
-                      const PrepareOptions& options) {
+                      const PrepareSettings& options) {
   return prepare_batch(context, {cloud}, options).front();
+}
+
+PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
+                      const RegistrationOptions& options) {
+  return prepare(context, cloud, resolve(options).prepare);
+}
+
+RegistrationResult align(const Context& context, const PreparedCloud& source,
+                         const PreparedCloud& target, const RegistrationSettings& options) {
+  return align_batch(context, {source, target}, {{0, 1}}, options).front();
 }
 
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationOptions& options) {
-  return align_batch(context, {source, target}, {{0, 1}}, options).front();
+  return align(context, source, target, resolve(options));
+}
+
+RegistrationResult align(const Context& context, const PointCloudView& source,
+                         const PointCloudView& target, const RegistrationSettings& settings) {
+  const std::vector<PreparedCloud> clouds =
+      prepare_batch(context, {source, target}, settings.prepare, {"source", "target"});
+  return align(context, clouds[0], clouds[1], settings);
 }
 
 RegistrationResult align(const Context& context, const PointCloudView& source,
                          const PointCloudView& target, const RegistrationOptions& options) {
-  options.validate();
-  return align_batch(
-             context,
-             prepare_batch(context, {source, target}, options.prepare, {"source", "target"}),
-             {{0, 1}}, options)
-      .front();
+  return align(context, source, target, resolve(options));
 }
 
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target,
                          const std::vector<Correspondence>& correspondences,
                          const RegistrationOptions& options) {
+  return align(context, source, target, correspondences, resolve(options));
+}
+
+RegistrationResult align(const Context& context, const PreparedCloud& source,
+                         const PreparedCloud& target, const RegistrationPrior& prior,
+                         const RegistrationOptions& options) {
+  return align(context, source, target, prior, resolve(options));
+}
+
+RegistrationResult align(const Context& context, const PreparedCloud& source,
+                         const PreparedCloud& target,
+                         const std::vector<Correspondence>& correspondences,
+                         const RegistrationSettings& options) {
   options.validate();
   const PreparedState& s = *checked_state(context, source, options, "source");
   const PreparedState& t = *checked_state(context, target, options, "target");
@@ -224,7 +257,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
 
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationPrior& prior,
-                         const RegistrationOptions& options) {
+                         const RegistrationSettings& options) {
   prior.validate();
   return align_batch(context, {source, target}, {{0, 1}}, {prior}, options).front();
 }
@@ -232,7 +265,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,
-                                            const RegistrationOptions& options,
+                                            const RegistrationSettings& options,
                                             const BatchCallbacks& callbacks) {
   return align_batch(context, clouds, pairs, std::vector<RegistrationPrior>(), options, callbacks);
 }
@@ -240,8 +273,25 @@ std::vector<RegistrationResult> align_batch(const Context& context,
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,
+                                            const RegistrationOptions& options,
+                                            const BatchCallbacks& callbacks) {
+  return align_batch(context, clouds, pairs, resolve(options), callbacks);
+}
+
+std::vector<RegistrationResult> align_batch(const Context& context,
+                                            const std::vector<PreparedCloud>& clouds,
+                                            const std::vector<Pair>& pairs,
                                             const std::vector<RegistrationPrior>& priors,
                                             const RegistrationOptions& options,
+                                            const BatchCallbacks& callbacks) {
+  return align_batch(context, clouds, pairs, priors, resolve(options), callbacks);
+}
+
+std::vector<RegistrationResult> align_batch(const Context& context,
+                                            const std::vector<PreparedCloud>& clouds,
+                                            const std::vector<Pair>& pairs,
+                                            const std::vector<RegistrationPrior>& priors,
+                                            const RegistrationSettings& options,
                                             const BatchCallbacks& callbacks) {
   options.validate();
   check_priors(priors, pairs.size(), options);

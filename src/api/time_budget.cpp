@@ -7,6 +7,7 @@
 
 #include "api/frames.hpp"
 #include "api/quality_levels.hpp"
+#include "api/with_settings.hpp"
 #include "common/validate.hpp"
 
 namespace gpureg {
@@ -17,7 +18,7 @@ constexpr double kConfident = 0.99;
 constexpr double kMinGrowth = 0.2, kMaxGrowth = 1.25;
 
 bool same_pose(const RegistrationResult& a, const RegistrationResult& b,
-               const EvidenceOptions& options) {
+               const EvidenceSettings& options) {
   return a.has_candidate && b.has_candidate &&
          same_mode_at(a.target_from_source, b.target_from_source,
                       middle_of(a.source_moments, Eigen::Vector3d::Zero()), options);
@@ -28,7 +29,7 @@ double ratio(double a, double b) { return b > 0 ? a / b : 1.0; }
 }  // namespace
 
 double predicted_milliseconds(const StageTimings& t, double overhead,
-                              const RegistrationOptions& from, const RegistrationOptions& to) {
+                              const RegistrationSettings& from, const RegistrationSettings& to) {
   // As many features are searched as matches are kept.
   const double matches = ratio(to.compatibility.max_matches, from.compatibility.max_matches);
   const double seeds = ratio(to.compatibility.seeds, from.compatibility.seeds);
@@ -39,7 +40,7 @@ double predicted_milliseconds(const StageTimings& t, double overhead,
 }
 
 TimedResult run_levels(const LevelRunner& runner, double milliseconds,
-                       const RegistrationOptions& options) {
+                       const RegistrationSettings& options) {
   const double begin = runner.now();
   TimedResult best;
   RegistrationResult last;
@@ -88,7 +89,8 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
 
 TimedResult align_within(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, double milliseconds,
-                         const RegistrationOptions& options) {
+                         const RegistrationOptions& given) {
+  const RegistrationSettings options = resolve(given);
   const auto begin = std::chrono::steady_clock::now();
   require(std::isfinite(milliseconds) && milliseconds > 0, "milliseconds", milliseconds,
           "a time > 0");

@@ -9,6 +9,7 @@
 #include "api/pair_input.hpp"
 #include "api/variants.hpp"
 #include "api/verify_by_surfaces.hpp"
+#include "api/with_settings.hpp"
 #include "common/for_each_on.hpp"
 #include "common/rigid.hpp"
 #include "common/stop_scope.hpp"
@@ -128,7 +129,7 @@ template <typename Conclude>
 Verifications verify_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
                            const std::vector<Pair>& pairs,
                            const std::vector<std::vector<UnalignedIsometry3d>>& poses,
-                           const RegistrationOptions& options, bool refine,
+                           const RegistrationSettings& options, bool refine,
                            Span<const std::uint32_t> matches, const Conclude& conclude) {
   options.validate();
   if (poses.size() != pairs.size())
@@ -140,7 +141,7 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
       require_rigid(poses[p][k], "poses[" + std::to_string(p) + "][" + std::to_string(k) + "]");
 
   Engine& engine = *Access::engine(context);
-  RegistrationOptions by_evidence = options;
+  RegistrationSettings by_evidence = options;
   by_evidence.method = RegistrationMethod::compatibility;
   Verifications results(pairs.size());
   const std::vector<PairVariant> variants = variants_of(clouds, pairs);
@@ -191,7 +192,7 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
 std::vector<std::vector<PoseVerification>> verify_poses_batch(
     const Context& context, const std::vector<PreparedCloud>& clouds,
     const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
-    const RegistrationOptions& options, const VerificationOptions& verification) {
+    const RegistrationSettings& options, const VerificationOptions& verification) {
   return verify_pairs(context, clouds, pairs, poses, options, verification.refine, {},
                       [&](Engine& engine, const std::vector<PairInput>& inputs,
                           const std::vector<VerifiedPair>& verified,
@@ -208,10 +209,17 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
                       });
 }
 
+std::vector<std::vector<PoseVerification>> verify_poses_batch(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
+    const RegistrationOptions& options, const VerificationOptions& verification) {
+  return verify_poses_batch(context, clouds, pairs, poses, resolve(options), verification);
+}
+
 Verifications verify_by_surfaces(const Context& context, const std::vector<PreparedCloud>& clouds,
                                  const std::vector<Pair>& pairs,
                                  const std::vector<std::vector<UnalignedIsometry3d>>& poses,
-                                 const RegistrationOptions& options, bool refine,
+                                 const RegistrationSettings& options, bool refine,
                                  const std::function<double(const PoseVerification&)>& confidence) {
   const std::uint32_t first = 0;  // a match that the evidence of surfaces does not look at
   return verify_pairs(context, clouds, pairs, poses, options, refine, {&first, 1},
@@ -225,10 +233,18 @@ Verifications verify_by_surfaces(const Context& context, const std::vector<Prepa
 std::vector<PoseVerification> verify_poses(const Context& context, const PreparedCloud& source,
                                            const PreparedCloud& target,
                                            const std::vector<UnalignedIsometry3d>& poses,
-                                           const RegistrationOptions& options,
+                                           const RegistrationSettings& options,
                                            const VerificationOptions& verification) {
   return verify_poses_batch(context, {source, target}, {{0, 1}}, {poses}, options, verification)
       .front();
+}
+
+std::vector<PoseVerification> verify_poses(const Context& context, const PreparedCloud& source,
+                                           const PreparedCloud& target,
+                                           const std::vector<UnalignedIsometry3d>& poses,
+                                           const RegistrationOptions& options,
+                                           const VerificationOptions& verification) {
+  return verify_poses(context, source, target, poses, resolve(options), verification);
 }
 
 }  // namespace gpureg

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "gpureg/verification.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg {
 
@@ -12,7 +13,7 @@ namespace gpureg {
 std::vector<std::vector<PoseVerification>> verify_by_surfaces(
     const Context& context, const std::vector<PreparedCloud>& clouds,
     const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
-    const RegistrationOptions& options, bool refine,
+    const RegistrationSettings& options, bool refine,
     const std::function<double(const PoseVerification&)>& confidence);
 
 }  // namespace gpureg

@@ -30,12 +30,6 @@ constexpr std::size_t kGroup = 12;
 constexpr double kOneScanWeight = 0.05;
 constexpr std::uint32_t kMostPairs = 1'000'000;
 
-float voxel_of(const RegistrationOptions& options) {
-  // Clouds of given features keep their points: the correspondence distance is 1.5 voxels.
-  return options.prepare.voxel_size > 0 ? options.prepare.voxel_size
-                                        : options.prepare.max_correspondence_distance / 1.5f;
-}
-
 void check_poses(const std::vector<UnalignedIsometry3d>& poses, std::size_t clouds) {
   if (poses.empty()) return;
   if (poses.size() != clouds)
@@ -63,7 +57,7 @@ class Calibration {
   }
 
   CalibrationResult run() {
-    prepared_ = prepare_batch(context_, clouds_, options_.prepare);
+    prepared_ = prepare_batch(context_, clouds_, options_);
     for (std::uint32_t k = 0; k < clouds_.size(); ++k)
       if (prepared_[k].size() > 0) usable_.push_back(k);
     choose_pairs();
@@ -133,7 +127,7 @@ class Calibration {
 
   /// false: stopped.
   bool align_halves(std::size_t count) {
-    const double voxel = static_cast<double>(voxel_of(options_));
+    const double voxel = static_cast<double>(options_.voxel_size);
     std::vector<double> noise(usable_.size(), -1.0);
     for (std::size_t begin = 0; begin < count; begin += kPairsPerChunk) {
       if (stop()) return false;
@@ -155,7 +149,7 @@ class Calibration {
         views.push_back(pair.source.view());
         views.push_back(pair.target.view());
       }
-      const std::vector<PreparedCloud> prepared = prepare_batch(context_, views, options_.prepare);
+      const std::vector<PreparedCloud> prepared = prepare_batch(context_, views, options_);
       const std::vector<RegistrationResult> results =
           align_batch(context_, prepared, pairs, options_);
       for (std::size_t k = 0; k < results.size(); ++k) {
@@ -183,7 +177,7 @@ class Calibration {
   }
 
   void judge_by_trajectory() {
-    const double max_rms = o_.max_error * static_cast<double>(voxel_of(options_));
+    const double max_rms = o_.max_error * static_cast<double>(options_.voxel_size);
     for (std::size_t k = 0; k < poses_.size(); ++k)
       if (!poses_[k].matrix().allFinite()) out_.scan_groups[k] = kNoScanGroup;
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
@@ -205,7 +199,7 @@ class Calibration {
 
   void judge_by_loops() {
     out_.loop_consistency.pairs = pairs_.size();
-    const auto verdicts = calibration::verdicts_of_loops(pairs_, results_, voxel_of(options_));
+    const auto verdicts = calibration::verdicts_of_loops(pairs_, results_, options_.voxel_size);
     for (std::size_t p = 0; p < pairs_.size(); ++p)
       if (verdicts[p])
         add(CalibrationKind::loop_consistency, pairs_[p], results_[p], *verdicts[p], 1.0);

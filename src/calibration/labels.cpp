@@ -41,7 +41,7 @@ bool is_correct(const RegistrationResult& result, const Eigen::Isometry3d& truth
 std::vector<std::optional<bool>> verdicts_of_loops(const std::vector<Pair>& pairs,
                                                    const std::vector<RegistrationResult>& results,
                                                    float voxel_size) {
-  LoopConsistencyOptions options = LoopConsistencyOptions::from_voxel_size(voxel_size);
+  LoopConsistencyOptions options{voxel_size};
   // All pairs take part, and nothing dampens or bounds what loops say.
   options.min_confidence = 0.005;
   options.max_odds_factor = 1e4;

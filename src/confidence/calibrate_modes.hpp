@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "confidence/confidence.hpp"
-#include "gpureg/options.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg::confidence {
 

@@ -44,7 +44,7 @@ Span<const double> fractions_for(double log_odds) {
 
 /// Whether a pose has returned to the mode, by the source points in correspondences under it.
 ReturnTest return_test(const ModeOutcome& mode, const PreparedState& source,
-                       const RegistrationOptions& options) {
+                       const RegistrationSettings& options) {
   ReturnTest test{};
   test.origin = mode.pose;
   test.squared_distance = -1.0;
@@ -62,7 +62,7 @@ ReturnTest return_test(const ModeOutcome& mode, const PreparedState& source,
 }
 
 PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
-                    const RegistrationOptions& options) {
+                    const RegistrationSettings& options) {
   const double distance = static_cast<double>(options.evidence.degeneracy_search_distance);
   PosesOfPair out;
   std::vector<PoseEvidence> evidence;
@@ -94,7 +94,7 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
 
 std::vector<PosesOfPair> search_degeneracies(Span<const PairInput> pairs,
                                              Span<const PairOutcome> outcomes,
-                                             const RegistrationOptions& options,
+                                             const RegistrationSettings& options,
                                              std::size_t threads) {
   std::vector<PosesOfPair> out(pairs.size);
   if (options.evidence.degeneracy_search_distance == 0.0f) return out;

@@ -12,7 +12,7 @@ namespace gpureg::confidence {
 /// distributed over at most `threads` threads.
 std::vector<PosesOfPair> search_degeneracies(Span<const PairInput> pairs,
                                              Span<const PairOutcome> outcomes,
-                                             const RegistrationOptions& options,
+                                             const RegistrationSettings& options,
                                              std::size_t threads);
 
 }  // namespace gpureg::confidence

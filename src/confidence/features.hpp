@@ -101,7 +101,7 @@ Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
 /// @param log_odds of all modes of the pair, from rank_modes(), in any order.
 /// @param own features_of() all modes, in the same order.
 /// @param mode index into both.
-/// @param refined largest number of modes that were refined, EvidenceOptions::modes: many distinct
+/// @param refined largest number of modes that were refined, EvidenceSettings::modes: many distinct
 ///   ends of the refinement mean that the clouds determine little.
 void add_rank(const std::vector<double>& log_odds, const std::vector<Features>& own,
               std::size_t mode, std::uint32_t refined, Features& features);

@@ -12,7 +12,7 @@ namespace {
 
 /// Rotations count by the displacement that they cause at this distance: twenty voxels, a metre at
 /// the default voxel size.
-double unit_length(const PrepareOptions& options) {
+double unit_length(const PrepareSettings& options) {
   const double voxel = options.voxel_size > 0
                            ? static_cast<double>(options.voxel_size)
                            : static_cast<double>(options.max_correspondence_distance) / 1.5;

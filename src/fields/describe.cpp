@@ -9,7 +9,6 @@
 #include "fields/find.hpp"
 #include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
-#include "fields/scale.hpp"
 #include "fields/statistics.hpp"
 
 namespace gpureg::fields {
@@ -33,6 +32,8 @@ std::string type_of() {
     return "Literal[" + names + "]";
   } else if constexpr (std::is_same_v<M, std::array<double, 6>>)
     return "list[float]";
+  else if constexpr (std::is_same_v<M, std::string>)
+    return "str";
   else if constexpr (std::is_same_v<M, bool>)
     return "bool";
   else
@@ -40,12 +41,10 @@ std::string type_of() {
 }
 
 template <typename M>
-std::string value_of(const M& value, const Scale& scale) {
-  if constexpr (std::is_same_v<M, float>)
-    if (scale.factor != 0) return shortest(scale.factor / scale.divisor) + " v";
-  if constexpr (std::is_same_v<M, double>)
-    if (scale.proportional) return shortest(static_cast<float>(value / kDefaultVoxel)) + " v";
-  if constexpr (std::is_same_v<M, bool>)
+std::string value_of(const M& value) {
+  if constexpr (std::is_same_v<M, std::string>)
+    return value.empty() ? "none" : value;
+  else if constexpr (std::is_same_v<M, bool>)
     return value ? "true" : "false";
   else if constexpr (std::is_enum_v<M>)
     return to_string(value);
@@ -74,8 +73,8 @@ StructText text_of() {
   const T object{};
   each<T>([&](const std::string& name, auto member, const Field& field) {
     using M = std::decay_t<decltype(object.*member)>;
-    out.fields.push_back({name, field.sentence, type_of<M>(), value_of(object.*member, field.scale),
-                          range_of<M>(field.range)});
+    out.fields.push_back(
+        {name, field.sentence, type_of<M>(), value_of(object.*member), range_of<M>(field.range)});
   });
   return out;
 }
@@ -88,8 +87,7 @@ std::vector<StructText> texts() {
 }  // namespace
 
 std::vector<StructText> all_structs() {
-  return texts<RegistrationOptions, PrepareOptions, CompatibilityOptions, QuadrupleOptions,
-               RefineOptions, EvidenceOptions, ConfidenceCalibration, LoopConsistencyOptions,
+  return texts<RegistrationOptions, PrepareOptions, ConfidenceCalibration, LoopConsistencyOptions,
                pose_graph::Options, pose_graph::GncOptions, pose_graph::LineProcessOptions,
                pose_graph::DriftOptions, pose_graph::LoopNoiseOptions, pose_graph::SolverOptions,
                reconstruction::Options, reconstruction::EdgeNoiseOptions,

@@ -11,7 +11,7 @@ namespace gpureg::fields {
 struct FieldText {
   std::string name, sentence;
   std::string type;   ///< in Python
-  std::string value;  ///< the default, or its multiple of the voxel size: "2 v"; empty for a group
+  std::string value;  ///< the default; empty for a group
   std::string range;  ///< unit, interval or names; empty where there is none
 };
 

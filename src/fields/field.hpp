@@ -8,28 +8,18 @@
 
 #include "fields/range.hpp"
 
-/// One description per struct of its fields: name, range, how it grows with the voxel, one
-/// sentence. Validation, JSON, the Python classes, tables of the documentation, the fuzzer and the
+/// One description per struct of its fields: name, range, one sentence.
+/// Validation, JSON, the Python classes, tables of the documentation, the fuzzer and the
 /// comparison of results come from it. A new field of a struct is one new line of its Fields.
 namespace gpureg::fields {
 
-/// How from_voxel_size() gets a length.
-struct Scale {
-  float factor = 0, divisor = 1;  ///< voxel_size / divisor * factor; factor 0: not from it
-  bool proportional = false;      ///< the default, which is for voxels of 5 cm, in proportion
-};
-constexpr Scale voxels(float factor, float divisor = 1) { return {factor, divisor, false}; }
-constexpr Scale kProportional{0, 1, true};
-
 struct Field {
-  constexpr Field(const char* n, const char* s) : name(n), sentence(s) {}
-  constexpr Field(const char* n, const Range& r, const char* s) : name(n), range(r), sentence(s) {}
-  constexpr Field(const char* n, const Range& r, const Scale& v, const char* s)
-      : name(n), range(r), scale(v), sentence(s) {}
+  constexpr Field(const char* n, const char* s = "") : name(n), sentence(s) {}
+  constexpr Field(const char* n, const Range& r, const char* s = "")
+      : name(n), range(r), sentence(s) {}
 
   const char* name;
   Range range = kAnything;
-  Scale scale;
   const char* sentence;
 };
 

@@ -18,10 +18,10 @@ struct Fields<loop_closure::ProposalOptions> {
   template <typename V>
   static void visit(V&& v) {
     using O = loop_closure::ProposalOptions;
-    v(&O::coarse_voxel_size, {"coarse_voxel_size", kPositive.in("metres"), kProportional, "Edge of the coarse voxels that say what a fragment observed: ten voxels."});
+    v(&O::coarse_voxel_size, {"coarse_voxel_size", kPositive.in_voxels(), "Edge of the coarse voxels that say what a fragment observed."});
     v(&O::min_overlap, {"min_overlap", kPositiveUpToOne, "Smallest expected overlap, within the uncertainty of the relative pose."});
-    v(&O::max_dilation, {"max_dilation", kNotNegative.in("metres"), kProportional, "Largest distance by which the uncertainty may widen the search."});
-    v(&O::min_uncertainty, {"min_uncertainty", kNotNegative.in("metres"), kProportional, "Pairs whose relative pose is known better than this are not proposed: standard deviation of the translation."});
+    v(&O::max_dilation, {"max_dilation", kNotNegative.in_voxels(), "Largest distance by which the uncertainty may widen the search."});
+    v(&O::min_uncertainty, {"min_uncertainty", kNotNegative.in_voxels(), "Pairs whose relative pose is known better than this are not proposed: standard deviation of the translation."});
     v(&O::min_time, {"min_time", kNotNegative.in("seconds"), "Pairs of one session closer in time are not proposed."});
     v(&O::per_fragment, {"per_fragment", "Proposals of a fragment with earlier fragments of its frame."});
     v(&O::between_frames, {"between_frames", "Proposals of a fragment with fragments that nothing connects it to."});
@@ -57,7 +57,7 @@ struct Fields<loop_closure::Options> {
   static constexpr const char* kName = "LoopClosureOptions";
   static constexpr const char* kGroup = "";
   static constexpr const char* kSentence =
-      "Options of a LoopCloser. The lengths are for voxels of 5 cm.";
+      "Options of a LoopCloser. Lengths are in voxels, but for those of graph.";
 
   // clang-format off: a field is a line.
   template <typename V>
@@ -67,9 +67,10 @@ struct Fields<loop_closure::Options> {
     v(&O::proposals, {"proposals", "Which pairs are registered."});
     v(&O::acceptance, {"acceptance", "When a loop is accepted."});
     v(&O::noise, {"noise", "Noise of registered poses."});
-    v(&O::information_unit, {"information_unit", kPositive.in("metres"), kProportional, "Length in which the information eigenvalues count rotations: twenty voxels."});
-    v(&O::graph, {"graph", "Optimisation: robust kernel, drift of odometry without covariance, noise of loops of the host."});
-    v(&O::drift_correlation, {"drift_correlation", kNotNegative.in("metres"), kProportional, "Distance over which errors of odometry without covariance have one sign; 0: independent errors."});
+    v(&O::information_unit, {"information_unit", kPositive.in_voxels(), "Length in which the information eigenvalues count rotations."});
+    v(&O::host_noise, {"host_noise", "Noise of loops of the host without information, in place of graph.loop_noise."});
+    v(&O::graph, {"graph", "Optimisation: robust kernel, drift of odometry without covariance."});
+    v(&O::drift_correlation, {"drift_correlation", kNotNegative.in_voxels(), "Distance over which errors of odometry without covariance have one sign; 0: independent errors."});
     v(&O::gravity_sigma, {"gravity_sigma", Range{1e-6, 180, true, false, true, "0, or degrees in (1e-6, 180]", "degrees"}, "Standard deviation of the up direction of fragments in the graph; 0: not used there."});
     v(&O::modes, {"modes", from(1, 16), "Poses of a pair that compete in the graph."});
     v(&O::chunk, {"chunk", from(1, kInfinity), "Registrations between two looks at the clock."});

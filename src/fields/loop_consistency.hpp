@@ -16,8 +16,9 @@ struct Fields<LoopConsistencyOptions> {
   template <typename V>
   static void visit(V&& v) {
     using O = LoopConsistencyOptions;
+    v(&O::voxel_size, {"voxel_size", kLength, "Of the clouds."});
     v(&O::closing_angle, {"closing_angle", kDegrees, "Standard deviation of the rotation error of a loop of three correct poses."});
-    v(&O::closing_distance, {"closing_distance", above(0, kMost, "a length > 0").in("metres"), voxels(3), "Standard deviation of its translation error."});
+    v(&O::closing_distance, {"closing_distance", above(0, kMost, "a number of voxels > 0").in_voxels(), "Standard deviation of its translation error."});
     v(&O::false_closure_rate, {"false_closure_rate", kOpenProbability, "Probability that a loop with a false pose closes all the same."});
     v(&O::missed_closure_rate, {"missed_closure_rate", kOpenProbability, "Probability that a loop of three correct poses does not close."});
     v(&O::max_odds_factor, {"max_odds_factor", from(1, kMost, "a factor of at least 1"), "Largest factor by which all loops together change the odds of a pose."});

@@ -50,7 +50,7 @@ struct Fields<pose_graph::LoopNoiseOptions> {
   template <typename V>
   static void visit(V&& v) {
     using O = pose_graph::LoopNoiseOptions;
-    v(&O::translation, {"translation", kPositive.in("metres"), kProportional, "Sigma of the translation."});
+    v(&O::translation, {"translation", kPositive.in("metres"), "Sigma of the translation."});
     v(&O::rotation, {"rotation", kPositive.in("degrees"), "Sigma of the rotation."});
   }
   // clang-format on

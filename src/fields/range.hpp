@@ -20,6 +20,7 @@ struct Range {
   const char* expected = nullptr;            ///< for messages; none: from the ends
   const char* unit = nullptr;                ///< for documents, instead of `expected`
   bool checked = true;
+  bool voxels = false;  ///< a length of in_units()
 
   constexpr bool contains(double value) const {
     if (!checked || (or_zero && value == 0)) return true;
@@ -28,6 +29,11 @@ struct Range {
   constexpr Range in(const char* of) const {
     Range out = *this;
     out.unit = of;
+    return out;
+  }
+  constexpr Range in_voxels() const {
+    Range out = in("voxels");
+    out.voxels = true;
     return out;
   }
 };
@@ -48,6 +54,9 @@ constexpr Range kLength =
 constexpr Range kLengthOrZero{
     limits::kMinLength, limits::kMaxLength, false, false, true, "0 or a length in [1e-6, 1e6]",
     "metres, or 0"};
+constexpr Range kVoxels = from(1e-3, 1e3, "a number of voxels in [0.001, 1000]").in("voxels");
+constexpr Range kVoxelsOrZero{
+    1e-3, 1e3, false, false, true, "0 or a number of voxels in [0.001, 1000]", "voxels, or 0"};
 constexpr Range kDegrees = above(0, 180, "degrees in (0, 180]");
 constexpr Range kRatio = from(0, 1, "a ratio in [0, 1]");
 constexpr Range kPositiveRatio = above(0, 1, "a ratio in (0, 1]");

@@ -37,13 +37,13 @@ bool normals_in_plane(const RawCloud& raw, const ScanPlane& plane) {
 
 }  // namespace
 
-double layer_distance(const PrepareOptions& options) {
+double layer_distance(const PrepareSettings& options) {
   const double voxel = options.voxel_size > 0 ? static_cast<double>(options.voxel_size)
                                               : 0.5 * static_cast<double>(options.normal_radius);
   return kLayerDistance * voxel;
 }
 
-Extruded::Extruded(const RawCloud& raw, bool model, const PrepareOptions& options) : cloud_(raw) {
+Extruded::Extruded(const RawCloud& raw, bool model, const PrepareSettings& options) : cloud_(raw) {
   if (model) return;
   const auto plane = find_scan_plane(raw.points, raw.size, raw.point_stride);
   if (!plane) return;

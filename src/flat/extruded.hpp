@@ -9,7 +9,7 @@
 namespace gpureg {
 
 /// Between the layers of a 2-D scan, metres.
-double layer_distance(const PrepareOptions& options);
+double layer_distance(const PrepareSettings& options);
 
 /// A cloud for the engines: that of a 2-D scanner in layers along the normal of its plane, so that
 /// its curves become surfaces; every other one as it is. It is decided on the host, so that
@@ -22,7 +22,7 @@ class Extruded {
 
   /// @param raw rows in host memory, which have to outlive this unless plane() exists.
   /// @param model see PointCloudView::model; a model is no scan.
-  Extruded(const RawCloud& raw, bool model, const PrepareOptions& options);
+  Extruded(const RawCloud& raw, bool model, const PrepareSettings& options);
 
   /// Valid as long as this object and the rows given to it.
   const RawCloud& cloud() const { return cloud_; }

@@ -16,7 +16,8 @@ constexpr double kViewpointVoxels = 10;
 }  // namespace
 
 struct MapBuilder::State {
-  explicit State(const MapOptions& of) : options(of), cells(of.prepare.voxel_size) {}
+  explicit State(const MapOptions& of)
+      : given(of), options(resolve(of)), cells(options.prepare.voxel_size) {}
 
   /// Number of the sensor position that stands for the place.
   std::size_t add_viewpoint(const Eigen::Vector3d& place) {
@@ -32,17 +33,15 @@ struct MapBuilder::State {
     return at->second;
   }
 
-  MapOptions options;
+  MapOptions given;
+  MapSettings options;
   reconstruction::VoxelMap cells;
   std::vector<Eigen::Vector3d> viewpoints;
   std::vector<Horizon> horizons;
   std::map<std::array<double, 3>, std::size_t> seen;
 };
 
-MapBuilder::MapBuilder(const MapOptions& options) {
-  options.validate();
-  state_ = std::make_unique<State>(options);
-}
+MapBuilder::MapBuilder(const MapOptions& options) : state_(std::make_unique<State>(options)) {}
 MapBuilder::~MapBuilder() = default;
 MapBuilder::MapBuilder(MapBuilder&&) noexcept = default;
 MapBuilder& MapBuilder::operator=(MapBuilder&&) noexcept = default;
@@ -79,6 +78,7 @@ PreparedMap MapBuilder::build() const {
   refuse_flat(cloud.view(), "the map");
   check_map(cloud, state_->options);
   auto out = std::make_shared<MapState>();
+  out->given = state_->given;
   out->options = state_->options;
   out->origin = cloud.origin;
   out->points = std::move(cloud.points);

@@ -59,7 +59,7 @@ class Cells {
 }  // namespace
 
 bool same_place(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
-                const Eigen::Vector3d& middle, const EvidenceOptions& options) {
+                const Eigen::Vector3d& middle, const EvidenceSettings& options) {
   const double trace = (a.linear().transpose() * b.linear()).trace();
   const double least =
       1 + 2 * portable::cos(static_cast<double>(options.mode_angle) * portable::kRadiansPerDegree);
@@ -68,7 +68,7 @@ bool same_place(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
 }
 
 std::vector<Candidate> distinct(std::vector<Candidate> candidates, const Eigen::Vector3d& middle,
-                                const EvidenceOptions& options, std::size_t most) {
+                                const EvidenceSettings& options, std::size_t most) {
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return std::tuple(-a.confidence, a.tile, a.mode) < std::tuple(-b.confidence, b.tile, b.mode);
   });

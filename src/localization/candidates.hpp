@@ -15,11 +15,11 @@ struct Candidate {
 
 /// Of two poses that move the middle of the scan to one place with one attitude, one is enough.
 bool same_place(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
-                const Eigen::Vector3d& middle, const EvidenceOptions& options);
+                const Eigen::Vector3d& middle, const EvidenceSettings& options);
 
 /// The most confident candidates, each of another place.
 std::vector<Candidate> distinct(std::vector<Candidate> candidates, const Eigen::Vector3d& middle,
-                                const EvidenceOptions& options, std::size_t most);
+                                const EvidenceSettings& options, std::size_t most);
 
 /// The map within a distance of the scan's points at a pose, without sides that are inferred.
 PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>& scan,

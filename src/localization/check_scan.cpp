@@ -100,7 +100,7 @@ void refuse_flat(const PointCloudView& cloud, const std::string& name) {
                           "align 2-D scans with one another");
 }
 
-void check_map(const PointCloud& cloud, const MapOptions& options) {
+void check_map(const PointCloud& cloud, const MapSettings& options) {
   const double voxel = static_cast<double>(options.prepare.voxel_size);
   const double spacing = suggest_voxel_size({cloud.view()}).spacing;
   const double extent = extent_of(cloud.view()).longest;
@@ -112,7 +112,7 @@ void check_map(const PointCloud& cloud, const MapOptions& options) {
     text << "the map extends over " << extent << " only";
   else
     return;
-  text << ", but prepare.voxel_size is " << voxel << ": it does not fit, or is in another unit";
+  text << ", but voxel_size is " << voxel << ": it does not fit, or is in another unit";
   throw InvalidArgument(text.str());
 }
 

@@ -15,6 +15,6 @@ void check_unit(const PointCloudView& scan, const MapState& map, const std::stri
 void refuse_flat(const PointCloudView& cloud, const std::string& name);
 
 /// check_unit() of the points of a map, before its tiles are made.
-void check_map(const PointCloud& cloud, const MapOptions& options);
+void check_map(const PointCloud& cloud, const MapSettings& options);
 
 }  // namespace gpureg::localization

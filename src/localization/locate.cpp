@@ -33,7 +33,7 @@ LocateStatus status_of(const LocateResult& result, double min_confidence) {
 }
 
 /// A caller who asks for more confidence than usual gets the whole search before "not found".
-bool is_sure(const LocateResult& result, const LocateOptions& options) {
+bool is_sure(const LocateResult& result, const LocateSettings& options) {
   return !result.poses.empty() &&
          result.poses.front().confidence >= std::max(kSure, options.min_confidence);
 }
@@ -49,7 +49,7 @@ void keep_possible(const std::vector<Verified>& places, Scan& scan) {
 }
 
 LocateResult result_of(const std::vector<Verified>& verified, const Scan& scan,
-                       const LocateOptions& options) {
+                       const LocateSettings& options) {
   LocateResult out;
   out.scan_points = scan.points.size();
   out.tiles = scan.tiles;
@@ -79,7 +79,7 @@ LocateResult result_of(const std::vector<Verified>& verified, const Scan& scan,
 /// Sets the results of the scans that the plan of the map places surely, first with little effort.
 /// @return numbers of the others.
 std::vector<std::size_t> see_from_above(const Context& context, const MapState& map,
-                                        const LocateOptions& options, std::vector<Scan>& scans,
+                                        const LocateSettings& options, std::vector<Scan>& scans,
                                         std::vector<LocateResult>& results) {
   std::vector<std::size_t> open(scans.size());
   std::iota(open.begin(), open.end(), std::size_t{0});
@@ -106,9 +106,8 @@ std::vector<std::size_t> see_from_above(const Context& context, const MapState& 
   return open;
 }
 
-void check(const MapState& map, const LocateOptions& options, std::size_t scans,
+void check(const MapState& map, const LocateSettings& options, std::size_t scans,
            const std::vector<LocatePrior>& priors, const std::vector<std::string>& names) {
-  options.validate();
   const auto fits = [&](std::size_t count, const char* what) {
     if (count != 0 && count != scans)
       throw InvalidArgument(std::string(what) + " has " + std::to_string(count) +
@@ -118,20 +117,20 @@ void check(const MapState& map, const LocateOptions& options, std::size_t scans,
   fits(names.size(), "names");
   for (std::size_t k = 0; k < priors.size(); ++k)
     priors[k].validate("priors[" + std::to_string(k) + "]");
-  const float of_map = map.options.prepare.voxel_size,
-              of_options = options.registration.prepare.voxel_size;
+  const float of_map = map.given.voxel_size, of_options = options.options.voxel_size;
   if (of_map != of_options)
-    throw InvalidArgument("registration.prepare.voxel_size is " + shown(of_options) +
+    throw InvalidArgument("registration.voxel_size is " + shown(of_options) +
                           ", but the map was made with " + shown(of_map));
 }
 
 }  // namespace
 
 std::vector<LocateResult> locate(const Context& context, const std::vector<PointCloudView>& scans,
-                                 const PreparedMap& map, const LocateOptions& options,
+                                 const PreparedMap& map, const LocateOptions& given,
                                  const std::vector<LocatePrior>& priors,
                                  const std::vector<std::string>& names) {
   const MapState& state = MapState::of(map);
+  const LocateSettings options = resolve(given);
   check(state, options, scans.size(), priors, names);
   for (std::size_t k = 0; k < scans.size(); ++k) {
     scans[k].validate();
@@ -193,8 +192,8 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
 
 LocateResult locate(const Context& context, const PointCloudView& scan, const PreparedMap& map,
                     const LocatePrior& prior) {
-  const float voxel_size = map.options().prepare.voxel_size;
-  return locate(context, {scan}, map, LocateOptions::from_voxel_size(voxel_size), {prior}).front();
+  const LocateOptions options{RegistrationOptions{map.options().voxel_size}};
+  return locate(context, {scan}, map, options, {prior}).front();
 }
 
 }  // namespace gpureg::localization

@@ -18,7 +18,7 @@ unsigned host_threads(const Context& context) {
 
 std::size_t PreparedMap::size() const { return MapState::of(*this).points.size(); }
 std::size_t PreparedMap::tiles() const { return MapState::of(*this).tiles.size(); }
-const MapOptions& PreparedMap::options() const { return MapState::of(*this).options; }
+const MapOptions& PreparedMap::options() const { return MapState::of(*this).given; }
 
 PointCloud PreparedMap::cloud() const {
   const MapState& state = MapState::of(*this);

@@ -13,7 +13,7 @@
 namespace gpureg::localization {
 namespace {
 
-constexpr files::BinaryKind kKind{"gpuregMP", 3, "saved map of gpureg"};
+constexpr files::BinaryKind kKind{"gpuregMP", 4, "saved map of gpureg"};
 /// Of a file that is read: keeps devices and mistaken paths from eating the memory.
 constexpr std::size_t kMostBytes = std::size_t{1} << 36;
 
@@ -31,7 +31,7 @@ void each_number(T& object, const With& with) {
 
 /// The payload, part by part.
 void each_part(const MapState& map, const files::Sink& write) {
-  each_number(map.options, [&](const auto& value) { write(files::bytes_of(&value, 1)); });
+  each_number(map.given, [&](const auto& value) { write(files::bytes_of(&value, 1)); });
   write(files::bytes_of(map.origin.data(), 3));
   const std::uint64_t counts[4] = {map.points.size(), map.sides.size(), map.viewpoints.size(),
                                    map.sides_inferred};
@@ -48,7 +48,7 @@ void check_values(const MapState& map, const std::string& path) {
     if (!holds) throw IoError(path + ": " + what + "; the file is damaged");
   };
   try {
-    map.options.validate();
+    map.given.validate();
   } catch (const InvalidArgument& error) {
     require_that(false, error.what());
   }
@@ -79,7 +79,7 @@ PreparedMap PreparedMap::load(const std::string& path) {
   {
     const std::string content = files::read_file(path, kMostBytes);
     files::PayloadReader file(files::payload_of(content, kKind, path), path);
-    each_number(map->options, [&](auto& value) { file.values(&value, 1); });
+    each_number(map->given, [&](auto& value) { file.values(&value, 1); });
     file.values(map->origin.data(), 3);
     std::uint64_t counts[4];
     file.values(counts, 4);
@@ -92,6 +92,7 @@ PreparedMap PreparedMap::load(const std::string& path) {
     if (file.left() > 0) file.fail();
   }
   check_values(*map, path);
+  map->options = resolve(map->given);
   map->make_tiles();
   return MapState::map(std::move(map));
 }

@@ -9,6 +9,7 @@
 
 #include "gpureg/localization.hpp"
 #include "localization/horizon.hpp"
+#include "localization/settings.hpp"
 
 namespace gpureg {
 class Engine;
@@ -24,7 +25,8 @@ struct FloorPlan;
 
 /// What a map consists of, and what follows from it.
 struct MapState {
-  MapOptions options;
+  MapOptions given;
+  MapSettings options;                  ///< of them
   Eigen::Vector3d origin{0, 0, 0};      ///< of the frame that the rows below are relative to
   std::vector<Eigen::Vector3f> points;  ///< by tile
   std::vector<Side> sides;              ///< empty, or one per point; 0 0 0: not known
@@ -56,7 +58,7 @@ struct MapState {
   /// @param prepare the options of the map with another voxel size, 0 for points as they are.
   std::vector<PreparedCloud> prepared_tiles(const Context& context, std::uint64_t search,
                                             const std::vector<std::size_t>& wanted,
-                                            const PrepareOptions& prepare) const;
+                                            const PrepareSettings& prepare) const;
 
   /// Made when the first scan needs it.
   const FloorPlan& plan(unsigned threads) const;
@@ -92,7 +94,7 @@ unsigned host_threads(const Context& context);
 /// Views of clouds that cut() made; a piece of a map was not seen from its origin.
 PointCloudView view_of(const PointCloud& cloud);
 std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds);
-/// Options for points that are means of voxels already.
-PrepareOptions as_they_are(PrepareOptions options);
+/// Settings for points that are means of voxels already.
+PrepareSettings as_they_are(PrepareSettings options);
 
 }  // namespace gpureg::localization

@@ -1,29 +1,39 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 
+#include "fields/in_units.hpp"
 #include "fields/localization.hpp"
-#include "fields/scale.hpp"
 #include "fields/validate.hpp"
+#include "localization/settings.hpp"
+#include "settings/resolve.hpp"
 
 namespace gpureg::localization {
 
-MapOptions MapOptions::from_voxel_size(float voxel_size) {
-  require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
-  MapOptions options;
-  fields::scale(options, voxel_size);
-  return options;
+MapSettings resolve(const MapOptions& options) {
+  fields::validate(options);
+  return {gpureg::resolve(options.prepare, options.voxel_size),
+          fields::length_of(options.tile_size, options.voxel_size),
+          fields::length_of(options.halo, options.voxel_size)};
 }
 
-void MapOptions::validate() const {
-  fields::validate(*this);
-  require(prepare.voxel_size > 0, "prepare.voxel_size", prepare.voxel_size, "a length > 0");
+void MapOptions::validate() const { resolve(*this); }
+
+LocateSettings resolve(const LocateOptions& options) {
+  options.validate();
+  return {options.registration,
+          gpureg::resolve(options.registration),
+          options.min_confidence,
+          options.coarse_factor,
+          options.coarse_tiles,
+          options.fine_tiles,
+          options.candidates,
+          fields::length_of(options.neighborhood, options.registration.voxel_size)};
 }
 
-LocateOptions LocateOptions::from_voxel_size(float voxel_size, std::uint32_t quality) {
-  LocateOptions options;
-  options.registration = RegistrationOptions::from_voxel_size(voxel_size, quality);
-  options.neighborhood *= static_cast<double>(voxel_size) / fields::kDefaultVoxel;
-  return options;
+RegistrationSettings LocateSettings::registration_at(double factor) const {
+  RegistrationOptions wider = options;
+  wider.voxel_size *= static_cast<float>(factor);
+  return gpureg::resolve(wider);
 }
 
 void LocateOptions::validate() const {
@@ -32,13 +42,6 @@ void LocateOptions::validate() const {
           to_string(registration.method), "compatibility: only it verifies poses by evidence");
   require(registration.calibration.is_identity(), "registration.calibration", "given",
           "none: it is of pairs, and the confidence of a place has a fit of its own");
-}
-
-ChangeOptions ChangeOptions::from_voxel_size(float voxel_size) {
-  require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
-  ChangeOptions options;
-  fields::scale(options, voxel_size);
-  return options;
 }
 
 void ChangeOptions::validate() const { fields::validate(*this); }

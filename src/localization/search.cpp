@@ -5,7 +5,6 @@
 #include <functional>
 
 #include "fields/localization.hpp"
-#include "fields/scale.hpp"
 #include "math/trigonometry.hpp"
 
 namespace gpureg::localization {
@@ -13,6 +12,9 @@ namespace {
 
 /// Prepared points of the tiles that are aligned together: about 1 GB.
 constexpr double kPointsAtOnce = 400'000;
+/// Matches of a scan and a tile: a tile has many more matches of its own than the scan has, and a
+/// random choice of few holds hardly any of the scan's.
+constexpr std::uint32_t kMatches = 65536;
 /// Of the coarsest voxels, in voxels of the coarse search.
 constexpr double kCoarser = 2;
 /// Poses and tiles with less than this share of the odds of the most confident one, and poses with
@@ -41,20 +43,19 @@ RegistrationPrior prior_of_pair(const Scan& scan) {
 
 /// One search: in which voxels, and which scans in which tiles.
 struct Search {
-  RegistrationOptions registration;
-  PrepareOptions prepare;  ///< of the tiles
-  double factor = 1;       ///< of the voxels
+  RegistrationSettings registration;
+  PrepareSettings prepare;  ///< of the tiles
+  double factor = 1;        ///< of the voxels
   PreparedCloud Scan::* cloud = &Scan::cloud;
   std::uint64_t number = 0;
   std::function<bool(std::size_t scan, std::size_t tile)> wants;
 };
 
-Search search_with(const MapState& map, const LocateOptions& options, double factor,
+Search search_with(const MapState& map, const LocateSettings& options, double factor,
                    PreparedCloud Scan::* cloud) {
   Search out;
-  out.registration = options.registration;
-  fields::multiply_lengths(out.registration, factor);
-  out.registration.compatibility.max_matches = options.max_matches;
+  out.registration = options.registration_at(factor);
+  out.registration.compatibility.max_matches = kMatches;
   out.prepare = prepare_for(map, factor);
   out.factor = factor;
   out.cloud = cloud;
@@ -96,7 +97,7 @@ bool is_hopeless(double confidence, double best) {
   return odds_of(confidence) < kHopeless * odds_of(best);
 }
 
-void run(const Context& context, const MapState& map, const LocateOptions& options,
+void run(const Context& context, const MapState& map, const LocateSettings& options,
          const Search& search, std::vector<Scan>& scans) {
   std::vector<std::size_t> together;
   double points = 0;
@@ -141,7 +142,7 @@ void keep_best(const Scan& scan, std::size_t most, std::vector<char>& tiles) {
 }
 
 /// Leaves the tiles that a search in coarser voxels finds the best of a large map.
-void search_coarser(const Context& context, const MapState& map, const LocateOptions& options,
+void search_coarser(const Context& context, const MapState& map, const LocateSettings& options,
                     std::vector<Scan>& scans, Wanted& wanted) {
   Search search = search_with(map, options, kCoarser * options.coarse_factor, &Scan::coarsest);
   std::vector<char> large;
@@ -173,7 +174,7 @@ Scan scan_of(PreparedCloud cloud, const LocatePrior& prior) {
   return scan;
 }
 
-void keep_likely(const LocateOptions& options, Scan& scan) {
+void keep_likely(const LocateSettings& options, Scan& scan) {
   std::vector<Candidate>& all = scan.candidates;
   all = distinct(std::move(all), scan.middle, options.registration.evidence, options.candidates);
   const auto is_last_hopeless = [&] {
@@ -195,18 +196,16 @@ bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan) {
   return false;
 }
 
-PrepareOptions prepare_for(const MapState& map, double factor) {
+PrepareSettings prepare_for(const MapState& map, double factor) {
   if (factor == 1) return as_they_are(map.options.prepare);
-  PrepareOptions out = map.options.prepare;
-  fields::multiply_lengths(out, factor);
-  return out;
+  return gpureg::resolve(map.given.prepare, map.given.voxel_size * static_cast<float>(factor));
 }
 
-double coarsest_factor(const MapState& map, const LocateOptions& options) {
+double coarsest_factor(const MapState& map, const LocateSettings& options) {
   return map.tiles.size() > options.coarse_tiles ? kCoarser * options.coarse_factor : 0;
 }
 
-void search_all_tiles(const Context& context, const MapState& map, const LocateOptions& options,
+void search_all_tiles(const Context& context, const MapState& map, const LocateSettings& options,
                       std::vector<Scan>& scans) {
   Wanted wanted(scans.size(), std::vector<char>(map.tiles.size(), 0));
   for (std::size_t k = 0; k < scans.size(); ++k) {
@@ -220,7 +219,7 @@ void search_all_tiles(const Context& context, const MapState& map, const LocateO
   run(context, map, options, search, scans);
 }
 
-void search_best_tiles(const Context& context, const MapState& map, const LocateOptions& options,
+void search_best_tiles(const Context& context, const MapState& map, const LocateSettings& options,
                        const std::vector<std::size_t>& which, std::vector<Scan>& scans) {
   Wanted wanted(scans.size(), std::vector<char>(map.tiles.size(), 0));
   for (const std::size_t k : which) {

@@ -27,24 +27,24 @@ Scan scan_of(PreparedCloud cloud, const LocatePrior& prior);
 bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan);
 
 /// The most confident candidates of different places, without hopeless ones.
-void keep_likely(const LocateOptions& options, Scan& scan);
+void keep_likely(const LocateSettings& options, Scan& scan);
 
 /// Preparation of scans and tiles in voxels `factor` times as wide as those of the map.
-PrepareOptions prepare_for(const MapState& map, double factor);
+PrepareSettings prepare_for(const MapState& map, double factor);
 
 /// Voxels of the search before the coarse one, in voxels of the map; 0: a map of so few tiles needs
 /// none.
-double coarsest_factor(const MapState& map, const LocateOptions& options);
+double coarsest_factor(const MapState& map, const LocateSettings& options);
 
 /// Aligns the scans with all tiles in coarse voxels, and keeps the most confident places. A scan
 /// that may be in more than `coarse_tiles` tiles, and has enough points in coarser voxels, is
 /// aligned with all of them in those, and in coarse voxels with the best.
-void search_all_tiles(const Context& context, const MapState& map, const LocateOptions& options,
+void search_all_tiles(const Context& context, const MapState& map, const LocateSettings& options,
                       std::vector<Scan>& scans);
 
 /// Aligns the scans of `which` with the `fine_tiles` tiles that were the most confident in the
 /// coarse search, in voxels of the map.
-void search_best_tiles(const Context& context, const MapState& map, const LocateOptions& options,
+void search_best_tiles(const Context& context, const MapState& map, const LocateSettings& options,
                        const std::vector<std::size_t>& which, std::vector<Scan>& scans);
 
 }  // namespace gpureg::localization

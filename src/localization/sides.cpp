@@ -29,7 +29,7 @@ Sided sided(const Context& context, const MapState& map, std::size_t tile) {
     out.index.push_back(static_cast<std::size_t>(&p - map.points.data()));
     return true;
   });
-  PrepareOptions options = as_they_are(map.options.prepare);
+  PrepareSettings options = as_they_are(map.options.prepare);
   options.depth_maps = 1;
   options.surface_side_distance = 0;
   options.wide_feature_radius = 0;

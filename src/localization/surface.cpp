@@ -16,7 +16,7 @@ namespace gpureg::localization {
 namespace {
 
 /// For the sides of surfaces: points of half a voxel, no features.
-PrepareOptions side_options(PrepareOptions options) {
+PrepareSettings side_options(PrepareSettings options) {
   options.voxel_size /= 2;
   options.depth_maps = 1;
   options.surface_side_distance = 0;
@@ -27,7 +27,7 @@ PrepareOptions side_options(PrepareOptions options) {
 }  // namespace
 
 PointCloud seen_surface(const Context& context, const PointCloudView& scan,
-                        const PrepareOptions& options) {
+                        const PrepareSettings& options) {
   if (scan.size == 0) return {};
   const WithoutFeatures without(scan.size);
   const PreparedCloud prepared = prepare(context, without.of(scan), side_options(options));
@@ -43,7 +43,7 @@ PointCloud seen_surface(const Context& context, const PointCloudView& scan,
 
 void check_rigid(const UnalignedIsometry3d& pose) { require_rigid(pose, "map_from_scan"); }
 
-std::vector<std::size_t> kept_rows(const PointCloudView& view, const PrepareOptions& options) {
+std::vector<std::size_t> kept_rows(const PointCloudView& view, const PrepareSettings& options) {
   const WithoutStrayPoints without(raw_cloud(view), options);
   if (!without.rows().empty()) return {without.rows().begin(), without.rows().end()};
   std::vector<std::size_t> out;

@@ -3,6 +3,7 @@
 
 #include <unordered_map>
 
+#include "api/with_settings.hpp"
 #include "gpureg/localization.hpp"
 #include "localization/horizon.hpp"
 
@@ -11,7 +12,7 @@ namespace gpureg::localization {
 /// A scan as points of half a voxel, without features: with normals towards the sensor where it is
 /// known from where the scan was seen, and with viewpoints where they are known.
 PointCloud seen_surface(const Context& context, const PointCloudView& scan,
-                        const PrepareOptions& options);
+                        const PrepareSettings& options);
 
 /// @throws InvalidArgument for a pose that is no rigid motion.
 void check_rigid(const UnalignedIsometry3d& pose);
@@ -20,7 +21,7 @@ void check_place(const UnalignedIsometry3d& map_from_scan);
 
 /// Numbers of the points that prepare() keeps where it does not downsample: those that are finite
 /// and not stray. The others have no normals.
-std::vector<std::size_t> kept_rows(const PointCloudView& view, const PrepareOptions& options);
+std::vector<std::size_t> kept_rows(const PointCloudView& view, const PrepareSettings& options);
 
 /// Small discs that a surface consists of, in one frame.
 struct Surface {

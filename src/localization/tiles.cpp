@@ -15,7 +15,7 @@ constexpr std::uint64_t kMostTiles = 1 << kTileBits;
 /// Prepared points that a map keeps: about 3 GB. The least recently used ones make room.
 constexpr std::size_t kMostCachedPoints = 1'000'000;
 
-std::int64_t count_of(double extent, const MapOptions& options) {
+std::int64_t count_of(double extent, const MapSettings& options) {
   const double inner = extent - 2 * options.halo;
   return static_cast<std::int64_t>(
       std::clamp(std::ceil(inner / options.tile_size), 1.0, static_cast<double>(kMostTiles)));
@@ -107,7 +107,7 @@ std::string MapState::name_of(std::size_t tile) {
   return "tile " + std::to_string(tile) + " of the map";
 }
 
-PrepareOptions as_they_are(PrepareOptions options) {
+PrepareSettings as_they_are(PrepareSettings options) {
   options.voxel_size = 0;
   options.keep_range_limits = true;  // the scans have left theirs out
   return options;
@@ -150,7 +150,7 @@ void MapState::keep(const Key& key, const PreparedCloud& cloud, std::uint64_t se
 
 std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context, std::uint64_t search,
                                                     const std::vector<std::size_t>& wanted,
-                                                    const PrepareOptions& prepare) const {
+                                                    const PrepareSettings& prepare) const {
   const auto key = [&](std::size_t tile) {
     return std::tuple(context.backend(), prepare.voxel_size, tile);
   };

@@ -7,14 +7,13 @@
 #include "common/for_each_on.hpp"
 #include "common/without_features.hpp"
 #include "fields/localization.hpp"
-#include "fields/scale.hpp"
 #include "localization/plan/floor_plan.hpp"
 
 namespace gpureg::localization {
 namespace {
 
 /// Sets the confidences of the places of a scan.
-void judge(const Scan& scan, const EvidenceOptions& options, bool planned,
+void judge(const Scan& scan, const EvidenceSettings& options, bool planned,
            std::vector<Verified>& places) {
   std::vector<PlaceEvidence> evidence;
   for (const Verified& v : places) evidence.push_back(v.evidence);
@@ -32,7 +31,7 @@ void judge(const Scan& scan, const EvidenceOptions& options, bool planned,
 /// Sparse scans overlap little in narrow voxels: what is not sure there and possible in the wide
 /// ones of the search is verified in these, too. @return confidences of 0 where it is not.
 std::vector<PoseVerification> verify_coarsely(const Context& context, const MapState& map,
-                                              const LocateOptions& options, const Scan& scan,
+                                              const LocateSettings& options, const Scan& scan,
                                               const std::vector<const Verified*>& fine,
                                               const std::vector<PointCloud>& around) {
   std::vector<PoseVerification> out(fine.size());
@@ -54,12 +53,10 @@ std::vector<PoseVerification> verify_coarsely(const Context& context, const MapS
   for (PreparedCloud& cloud :
        prepare_batch(context, neighborhoods, prepare_for(map, options.coarse_factor)))
     clouds.push_back(std::move(cloud));
-  RegistrationOptions registration = options.registration;
-  fields::multiply_lengths(registration, options.coarse_factor);
   VerificationOptions verification;
   verification.refine = true;
-  const auto results =
-      verify_poses_batch(context, clouds, pairs, poses, registration, verification);
+  const auto results = verify_poses_batch(
+      context, clouds, pairs, poses, options.registration_at(options.coarse_factor), verification);
   for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front();
   return out;
 }
@@ -86,7 +83,7 @@ struct Place {
   PointCloud around;
 };
 
-void compare_surfaces(const Context& context, const MapState& map, const LocateOptions& options,
+void compare_surfaces(const Context& context, const MapState& map, const LocateSettings& options,
                       float first_kernel, const std::vector<Scan*>& scans, const Place* begin,
                       const Place* end, std::vector<std::vector<Verified>>& out) {
   std::size_t most = 0;
@@ -96,7 +93,7 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
   const WithoutFeatures without(most);
   for (const Place* place = begin; place != end; ++place)
     views.push_back(without.of(view_of(place->around)));
-  PrepareOptions prepare = as_they_are(map.options.prepare);
+  PrepareSettings prepare = as_they_are(map.options.prepare);
   prepare.wide_feature_radius = 0;
   std::vector<PreparedCloud> clouds = prepare_batch(context, views, prepare);
   std::vector<Pair> pairs;
@@ -110,12 +107,12 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
         {static_cast<std::uint32_t>(clouds.size() - 1), static_cast<std::uint32_t>(place - begin)});
     poses.push_back(with_other_heights(place->candidate->map_from_scan, step));
   }
-  const auto verify = [&](const RegistrationOptions& registration) {
+  const auto verify = [&](const RegistrationSettings& registration) {
     return verify_by_surfaces(context, clouds, pairs, poses, registration, true,
                               confidence_of_surfaces);
   };
   if (first_kernel > 0) {
-    RegistrationOptions wide = options.registration;
+    RegistrationSettings wide = options.registration;
     wide.refine.kernel_width *= first_kernel;
     const auto refined = verify(wide);
     for (std::size_t k = 0; k < refined.size(); ++k)
@@ -137,7 +134,7 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
 }  // namespace
 
 std::vector<Verified> verify_places(const Context& context, const MapState& map,
-                                    const LocateOptions& options, const Scan& scan,
+                                    const LocateSettings& options, const Scan& scan,
                                     const std::vector<Verified>& before) {
   std::vector<PointCloud> around;
   std::vector<Pair> pairs;
@@ -181,7 +178,7 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
 }
 
 std::vector<std::vector<Verified>> verify_planned(const Context& context, const MapState& map,
-                                                  const LocateOptions& options, float first_kernel,
+                                                  const LocateSettings& options, float first_kernel,
                                                   const std::vector<Scan*>& scans) {
   std::vector<Place> places;
   for (std::size_t k = 0; k < scans.size(); ++k)

@@ -25,13 +25,13 @@ struct Verified {
 /// the map around them, without features; the most confident of each scan first.
 /// @param first_kernel see PlanEffort.
 std::vector<std::vector<Verified>> verify_planned(const Context& context, const MapState& map,
-                                                  const LocateOptions& options, float first_kernel,
+                                                  const LocateSettings& options, float first_kernel,
                                                   const std::vector<Scan*>& scans);
 
 /// Verifies the candidates of a scan against all of the map around them; the most confident first.
 /// @param before candidates of the scan that were verified already.
 std::vector<Verified> verify_places(const Context& context, const MapState& map,
-                                    const LocateOptions& options, const Scan& scan,
+                                    const LocateSettings& options, const Scan& scan,
                                     const std::vector<Verified>& before = {});
 
 }  // namespace gpureg::localization

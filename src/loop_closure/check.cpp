@@ -113,11 +113,11 @@ void check_fragment(const Fragment& fragment, const Options& options) {
     odometry_edge(fragment.id, fragment.id, UnalignedIsometry3d::Identity(), std::nullopt, options);
   }
   if (fragment.cloud.valid()) {
-    const float voxel_size = fragment.cloud.options().voxel_size;
-    if (voxel_size != options.registration.prepare.voxel_size)
+    const float voxel_size = fragment.cloud.voxel_size();
+    if (voxel_size != options.registration.voxel_size)
       throw InvalidArgument("the cloud of " + name + " has voxels of " + metres(voxel_size) +
                             ", this closer has voxels of " +
-                            metres(options.registration.prepare.voxel_size));
+                            metres(options.registration.voxel_size));
     if (fragment.cloud.size() == 0) {
       const PrepareStatistics& found = fragment.cloud.statistics();
       throw InvalidArgument("the cloud of " + name + " has no points: of " +
@@ -132,10 +132,10 @@ void check_fragment(const Fragment& fragment, const Options& options) {
 }
 
 void check_voxel_size(const State& state, const Options& options, const std::string& path) {
-  if (state.voxel_size != options.registration.prepare.voxel_size)
+  if (state.voxel_size != options.registration.voxel_size)
     throw InvalidArgument(path + " is the state of a closer with voxels of " +
                           metres(state.voxel_size) + ", this one has voxels of " +
-                          metres(options.registration.prepare.voxel_size));
+                          metres(options.registration.voxel_size));
 }
 
 void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
@@ -205,8 +205,7 @@ LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsom
   record.source = record.loop.source = source;
   record.target = record.loop.target = target;
   record.loop.from_host = true;
-  require_information(mode.information,
-                      information ? "information" : "graph.loop_noise.information");
+  require_information(mode.information, information ? "information" : "host_noise.information");
   record.modes = {mode};
   choose_mode(record, 0);
   return record;

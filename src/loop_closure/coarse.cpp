@@ -9,6 +9,7 @@
 
 #include "common/fnv1a.hpp"
 #include "math/exponential.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
@@ -112,7 +113,7 @@ std::uint64_t fingerprint_of(const PreparedCloud& cloud) {
   hash.add(cloud.normals());
   hash.add(cloud.viewpoints());
   for (int k = 0; k < 3; ++k) hash.add(cloud.origin()[k]);
-  const PrepareOptions& options = cloud.options();
+  const PrepareSettings& options = cloud.settings();
   for (const float v : {options.voxel_size, options.normal_radius, options.feature_radius,
                         options.wide_feature_radius, options.max_correspondence_distance,
                         options.surface_side_distance})

@@ -13,6 +13,7 @@
 #include "loop_closure/check.hpp"
 #include "loop_closure/commands.hpp"
 #include "loop_closure/neighbors.hpp"
+#include "loop_closure/options.hpp"
 #include "loop_closure/paths.hpp"
 #include "loop_closure/proposals.hpp"
 #include "loop_closure/register.hpp"
@@ -100,9 +101,8 @@ Published published(const State& state, const Options& options) {
 struct LoopCloser::Impl {
   using Command = std::function<void(State&)>;
 
-  Impl(const Context& c, const Options& o) : context(c), options(o) {
-    options.validate();
-    state.voxel_size = options.registration.prepare.voxel_size;
+  Impl(const Context& c, const Options& o) : context(c), options(in_units(o)) {
+    state.voxel_size = options.registration.voxel_size;
   }
 
   const Context context;

@@ -7,6 +7,7 @@
 
 #include "loop_closure/paths.hpp"
 #include "math/exponential.hpp"
+#include "reconstruction/audit/in_units.hpp"
 #include "reconstruction/audit/pair_verdicts.hpp"
 
 namespace gpureg::loop_closure {
@@ -65,8 +66,8 @@ std::vector<std::pair<Neighbor, Neighbor>> pairs_beside(const LoopRecord& record
 void hear_neighbors(const Context& context, const State& state, const Options& options,
                     std::vector<LoopRecord>& records) {
   if (options.accept_by_graph_alone) return;
-  const auto audit =
-      reconstruction::AuditOptions::from_voxel_size(options.registration.prepare.voxel_size);
+  const reconstruction::AuditOptions audit =
+      reconstruction::in_units({}, options.registration.voxel_size);
   const Paths odometry(state, false, options);
   std::vector<PreparedCloud> clouds;
   std::map<FragmentId, std::uint32_t> places;

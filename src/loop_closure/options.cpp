@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "loop_closure/options.hpp"
+#include "fields/in_units.hpp"
 #include "fields/loop_closure.hpp"
-#include "fields/scale.hpp"
 #include "fields/validate.hpp"
 
 namespace gpureg::loop_closure {
@@ -9,18 +10,18 @@ void ProposalOptions::validate() const { fields::validate(*this); }
 void AcceptanceOptions::validate() const { fields::validate(*this); }
 void Options::validate() const { fields::validate(*this); }
 
-Options Options::from_voxel_size(float voxel_size) {
-  Options options;
-  options.registration = RegistrationOptions::from_voxel_size(voxel_size);
-  fields::scale(options, voxel_size);
-  return options;
+Options in_units(const Options& options) {
+  options.validate();
+  const float voxel_size = options.registration.voxel_size;
+  Options out = fields::in_units(options, voxel_size);
+  out.graph.loop_noise = {fields::length_of(options.host_noise.translation, voxel_size),
+                          options.host_noise.rotation};
+  return out;
 }
 
 Options Options::loopsmart(float voxel_size) {
-  Options options = from_voxel_size(voxel_size);
-  const pose_graph::LoopNoiseOptions loop_noise = options.graph.loop_noise;
+  Options options{RegistrationOptions{voxel_size}};
   options.graph = pose_graph::Options::loopsmart();
-  options.graph.loop_noise = loop_noise;
   options.information_from_correspondences = true;
   options.accept_by_graph_alone = true;
   options.drift_correlation = 0;

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "common/rigid.hpp"
+#include "fields/in_units.hpp"
 #include "fields/loop_consistency.hpp"
-#include "fields/scale.hpp"
 #include "fields/validate.hpp"
 #include "loop_consistency/consistency_graph.hpp"
 
@@ -47,13 +47,6 @@ void check(const std::vector<Pair>& pairs, const std::vector<RegistrationResult>
 
 }  // namespace
 
-LoopConsistencyOptions LoopConsistencyOptions::from_voxel_size(float voxel_size) {
-  require(positive(voxel_size), "voxel_size", voxel_size, "a length > 0");
-  LoopConsistencyOptions options;
-  fields::scale(options, voxel_size);
-  return options;
-}
-
 void LoopConsistencyOptions::validate() const { fields::validate(*this); }
 
 std::vector<PairConsistency> loop_consistency(const std::vector<Pair>& pairs,
@@ -61,7 +54,8 @@ std::vector<PairConsistency> loop_consistency(const std::vector<Pair>& pairs,
                                               const LoopConsistencyOptions& options) {
   options.validate();
   check(pairs, results);
-  ConsistencyGraph graph(pairs, results, options);
+  const LoopConsistencyOptions in_units = fields::in_units(options, options.voxel_size);
+  ConsistencyGraph graph(pairs, results, in_units);
   for (std::uint32_t k = 0; k < options.iterations; ++k) update_from_loops(graph);
   update_from_paths(graph);
 

@@ -15,7 +15,7 @@ namespace gpureg::pipeline {
 /// confidence.
 template <typename Exec>
 void align_by_compatibility(Exec& exec, Span<const PairInput> inputs, Span<const PairView> pairs,
-                            const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+                            const RegistrationSettings& options, Span<PairOutcome> outcomes) {
   const auto begin = exec.mark();
   auto matches = merge_matches(exec, pairs, options);
   const auto matched = exec.mark();

@@ -13,7 +13,7 @@ namespace gpureg::pipeline {
 /// Only conclude() waits for the results.
 template <typename Exec>
 void align_by_quadruples(Exec& exec, Span<const PairView> all_pairs,
-                         const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+                         const RegistrationSettings& options, Span<PairOutcome> outcomes) {
   const auto begin = exec.mark();
   auto matches = match_features(exec, all_pairs, options);
   const auto matched = exec.mark();

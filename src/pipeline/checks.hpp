@@ -7,20 +7,20 @@
 #include "common/limits.hpp"
 #include "common/shown.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/options.hpp"
+#include "settings/settings.hpp"
 
 /// Errors of clouds that cannot be prepared: the same limits and messages on every backend.
 namespace gpureg::pipeline {
 
 /// The voxel size, for messages.
-inline std::string resolution_of(const PrepareOptions& options) {
+inline std::string resolution_of(const PrepareSettings& options) {
   return options.voxel_size > 0 ? "voxel_size " + shown(options.voxel_size)
                                 : "voxel_size 0, which keeps every point,";
 }
 
 /// Throws where the cells of a structure exceed the range of their keys; the structure with the
 /// smallest cells decides. radius: of the points about the local origin.
-inline void check_extent(float radius, const PrepareOptions& options) {
+inline void check_extent(float radius, const PrepareSettings& options) {
   float cell = options.feature_radius * 0.5f;
   if (options.voxel_size > 0 && options.voxel_size < cell) cell = options.voxel_size;
   const float blocks =
@@ -38,7 +38,7 @@ inline void check_extent(float radius, const PrepareOptions& options) {
 /// neighbourhoods make features meaningless and take hours. A large cloud of isolated points
 /// (millimetres, and a voxel size in metres) has nothing to align, but its closest-point grid
 /// exhausts the memory. squares: sum over the cells of their squared number of points.
-inline void check_density(double squares, std::size_t points, const PrepareOptions& options) {
+inline void check_density(double squares, std::size_t points, const PrepareSettings& options) {
   const double per_cell = points == 0 ? 0 : squares / static_cast<double>(points);
   if (per_cell > limits::kMaxPointsPerCell)
     throw InvalidArgument("on average more than " + std::to_string(static_cast<long>(per_cell)) +

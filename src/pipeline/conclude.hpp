@@ -12,7 +12,7 @@ inline double inlier_ratio(const RegistrationStatistics& s) {
 /// Reason for a missing alignment: the first stage without output; none where the pose passes the
 /// threshold.
 inline RegistrationReason reason_of(const RegistrationStatistics& s, bool has_pose,
-                                    const RegistrationOptions& options) {
+                                    const RegistrationSettings& options) {
   if (s.source_points < 4) return RegistrationReason::too_few_source_points;
   if (s.target_points < 4) return RegistrationReason::too_few_target_points;
   if (s.correspondences < 4) return RegistrationReason::no_usable_features;
@@ -24,7 +24,7 @@ inline RegistrationReason reason_of(const RegistrationStatistics& s, bool has_po
 }
 
 /// Quadruples are drawn where there are enough matches for one.
-inline std::uint64_t quadruples_drawn(std::uint32_t matches, const RegistrationOptions& options) {
+inline std::uint64_t quadruples_drawn(std::uint32_t matches, const RegistrationSettings& options) {
   return matches >= 4 ? options.quadruples.count : 0;
 }
 
@@ -46,7 +46,7 @@ inline void count_stages(const PairCounts& counts, RegistrationStatistics& s) {
 /// The same for the default method: each seed that gave a pose is scored.
 inline void count_seeds(std::uint32_t source_points, std::uint32_t target_points,
                         std::uint32_t matches, std::size_t candidates,
-                        const RegistrationOptions& options, RegistrationStatistics& s) {
+                        const RegistrationSettings& options, RegistrationStatistics& s) {
   const std::uint32_t seeds =
       matches < options.compatibility.seeds ? matches : options.compatibility.seeds;
   count_stages({source_points, target_points, matches, seeds, candidates, candidates}, s);
@@ -65,8 +65,8 @@ struct FinalVerification {
 };
 
 inline void conclude_pair(const PairCounts& counts, const FinalPose& pose,
-                          const FinalVerification& verification, const RegistrationOptions& options,
-                          PairOutcome& out) {
+                          const FinalVerification& verification,
+                          const RegistrationSettings& options, PairOutcome& out) {
   RegistrationStatistics& s = out.statistics;
   count_stages(counts, s);
   s.points_scored = counts.source_points;

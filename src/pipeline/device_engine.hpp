@@ -30,7 +30,7 @@ class DeviceEngine : public Engine {
   virtual std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) = 0;
   /// Waits for the copies, then prepares them as one batch. Other calls do not wait for the copies.
   virtual std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
-      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) = 0;
+      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareSettings& options) = 0;
   /// Waits for the copy. @return host copy of the points of an adopted cloud, rows of x, y, z.
   virtual std::vector<float> copy_points(const AdoptedCloud& cloud) = 0;
 };

@@ -32,25 +32,24 @@ class Engine {
   virtual std::string description() const = 0;
   virtual const void* memory() const = 0;  ///< owner of the clouds that this engine can align
   /// Number of pairs that go through the stages together.
-  virtual std::size_t pairs_per_chunk(const RegistrationOptions& options) const = 0;
+  virtual std::size_t pairs_per_chunk(const RegistrationSettings& options) const = 0;
   /// Throws InvalidArgument for rows that the host cannot read.
   virtual void check_on_host(const RawCloud&) const {}
   virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                              const PrepareOptions& options) = 0;
+                                                              const PrepareSettings& options) = 0;
   /// The same; the watcher may get the surfaces of some of the clouds before the end.
-  virtual std::vector<std::shared_ptr<PreparedState>> prepare_watched(Span<const RawCloud> clouds,
-                                                                      const PrepareOptions& options,
-                                                                      const SurfaceWatcher&) {
+  virtual std::vector<std::shared_ptr<PreparedState>> prepare_watched(
+      Span<const RawCloud> clouds, const PrepareSettings& options, const SurfaceWatcher&) {
     return prepare(clouds, options);
   }
-  virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+  virtual void align(Span<const PairInput> pairs, const RegistrationSettings& options,
                      Span<PairOutcome> outcomes) = 0;
   /// The feature matches that align() starts with (RegistrationMethod::compatibility).
   virtual std::vector<FeatureMatches> match(Span<const PairInput> pairs,
-                                            const RegistrationOptions& options) = 0;
+                                            const RegistrationSettings& options) = 0;
   /// Evidence of given poses, one entry for each pair; refine: they are refined before.
   virtual void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
-                      const RegistrationOptions& options, bool refine,
+                      const RegistrationSettings& options, bool refine,
                       Span<PairOutcome> outcomes) = 0;
   /// Surfaces for comparisons in pairs. The arrays, in host memory, have to outlive the result.
   virtual std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) = 0;

@@ -2,12 +2,12 @@
 #pragma once
 
 #include "algorithm/side_evidence.hpp"
-#include "gpureg/options.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg::pipeline {
 
-inline EvidenceTest evidence_test(const RegistrationOptions& options) {
-  const EvidenceOptions& e = options.evidence;
+inline EvidenceTest evidence_test(const RegistrationSettings& options) {
+  const EvidenceSettings& e = options.evidence;
   return {inlier_test(options.prepare.max_correspondence_distance, e.max_normal_angle),
           e.free_space_margin, e.min_range};
 }

@@ -10,7 +10,7 @@ namespace gpureg::pipeline {
 /// results.
 /// @param watch called with the points and the normals once they are there.
 template <typename Exec, typename Watch>
-auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options,
+auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareSettings& options,
              const Watch& watch) {
   const auto begin = exec.mark();
   auto points = downsample(exec, clouds, options);
@@ -47,7 +47,7 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
 }
 
 template <typename Exec>
-auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
+auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareSettings& options) {
   return prepare(exec, clouds, options, [](const auto&...) {});
 }
 

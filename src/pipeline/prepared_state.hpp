@@ -36,7 +36,7 @@ struct PreparedState {
 
   /// Identifies the memory that holds the data: clouds of one owner can be aligned.
   const void* owner = nullptr;
-  PrepareOptions options;
+  PrepareSettings options;
   PrepareStatistics statistics;
   float origin[3] = {0, 0, 0};  ///< local origin, relative to the caller's rows
   double frame_offset[3] = {0, 0,

@@ -7,8 +7,8 @@
 #include "algorithm/prior.hpp"
 #include "algorithm/support.hpp"
 #include "common/limits.hpp"
-#include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
+#include "settings/settings.hpp"
 
 #include <vector>
 

@@ -9,7 +9,7 @@ namespace gpureg::pipeline {
 /// align_by_compatibility().
 template <typename Exec>
 void verify(Exec& exec, Span<const PairView> pairs, const std::vector<PosesOfPair>& poses,
-            const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) {
+            const RegistrationSettings& options, bool refine, Span<PairOutcome> outcomes) {
   auto matches = merge_matches(exec, pairs, options);
   auto modes = modes_from_poses(exec, poses);
   if (refine) {

@@ -10,6 +10,7 @@
 
 #include "gpureg/error.hpp"
 #include "pruning/unit_features.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg::pruning {
 namespace {
@@ -143,7 +144,7 @@ Summary summarize(const PreparedCloud& cloud, const Matrix& words) {
   const std::vector<float> features = cloud.features();
   const std::size_t dimension = cloud.feature_dimension();
   return summarize({features.data(), dimension > 0 ? features.size() / dimension : 0, dimension},
-                   cloud.points(), cloud.normals(), cloud.options().feature_radius, words);
+                   cloud.points(), cloud.normals(), cloud.settings().feature_radius, words);
 }
 
 }  // namespace gpureg::pruning

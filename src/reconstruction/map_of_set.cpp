@@ -92,7 +92,7 @@ class MapMaker {
           [&](std::size_t done) { tell(MapStep::prepare, done, fragments_.size()); },
           callbacks_.should_stop};
       std::vector<PreparedFragment> all =
-          prepare_all(context_, fragments_, options_.registration.prepare, callbacks);
+          prepare_all(context_, fragments_, options_.registration, callbacks);
       if (all.size() < fragments_.size()) throw Cancelled("cancelled");
       for (std::size_t k = 0; k < all.size(); ++k) {
         if (use(k, all[k].reason)) out_.prepared.push_back(std::move(all[k]));
@@ -103,7 +103,7 @@ class MapMaker {
         poll();
         std::string reason;
         if (read) try {
-            fragments_.read(k, options_.registration.prepare);
+            fragments_.read(k, options_.registration);
           } catch (const IoError& error) {
             reason = error.what();
           }
@@ -217,6 +217,7 @@ class MapMaker {
 
   void place() {
     const Clock::time_point start = Clock::now();
+    options_.graph.voxel_size = options_.registration.voxel_size;
     if (options_.with_audit) {
       options_.audit.should_stop = callbacks_.should_stop;
       AuditedReconstruction audited =
@@ -235,7 +236,7 @@ class MapMaker {
 
   void make_surfaces() {
     const Clock::time_point start = Clock::now();
-    const PrepareOptions finer = surface_options(options_.registration.prepare);
+    const RegistrationOptions finer = surface_options(options_.registration);
     const std::size_t all = out_.map.placed();
     out_.surfaces.resize(out_.scans.size());
     std::size_t done = 0;
@@ -244,7 +245,7 @@ class MapMaker {
       poll();
       if (!out_.map.scans[k].placed) continue;
       const LoadedCloud cloud = fragments_.read(out_.scans[k], finer);
-      out_.surfaces[k] = surface_of(context_, cloud.view, options_.registration.prepare);
+      out_.surfaces[k] = surface_of(context_, cloud.view, options_.registration);
       tell(MapStep::surfaces, ++done, all);
     }
     out_.seconds.surfaces = since(start);
@@ -253,6 +254,7 @@ class MapMaker {
   void refine_poses() {
     const Clock::time_point start = Clock::now();
     RefineOptions& options = options_.refinement;
+    options.voxel_size = options_.registration.voxel_size;
     const auto all = static_cast<std::size_t>(options.iterations);
     options.should_stop = [&](int k) {
       tell(MapStep::refine, static_cast<std::size_t>(k), all);
@@ -274,20 +276,6 @@ class MapMaker {
 };
 
 }  // namespace
-
-MapOptions MapOptions::of(const RegistrationOptions& registration) {
-  const float voxel_size = registration.prepare.voxel_size;
-  MapOptions options;
-  options.registration = registration;
-  options.graph = Options::from_voxel_size(voxel_size);
-  options.audit = AuditOptions::from_voxel_size(voxel_size);
-  options.refinement = RefineOptions::for_depth_cameras(voxel_size);
-  return options;
-}
-
-MapOptions MapOptions::from_voxel_size(float voxel_size) {
-  return of(RegistrationOptions::from_voxel_size(voxel_size));
-}
 
 void MapOptions::validate() const {
   registration.validate();

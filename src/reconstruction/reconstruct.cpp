@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "fields/in_units.hpp"
+#include "fields/reconstruction.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
 #include "reconstruction/connections.hpp"
@@ -283,13 +285,14 @@ void explain(const std::vector<Pair>& pairs, const std::vector<RegistrationResul
 
 Reconstruction reconstruct_from_poses(std::size_t scans, const std::vector<Pair>& pairs,
                                       const std::vector<RegistrationResult>& results,
-                                      const Options& options,
-                                      const std::vector<Odometry>& odometry) {
-  options.validate();
+                                      const Options& given, const std::vector<Odometry>& odometry) {
+  given.validate();
+  const Options options = fields::in_units(given, given.voxel_size);
   check_pairs(scans, pairs);
   Reconstruction map;
   map.odometry = checked_odometry(scans, odometry, options.drift);
-  LoopConsistencyOptions consistency_options = options.consistency;
+  LoopConsistencyOptions consistency_options = given.consistency;
+  consistency_options.voxel_size = given.voxel_size;
   consistency_options.threads = options.threads;
   const std::vector<PairConsistency> consistency =
       loop_consistency(pairs, results, consistency_options);

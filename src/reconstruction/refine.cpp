@@ -7,6 +7,8 @@
 
 #include "common/host_threads.hpp"
 #include "common/validate.hpp"
+#include "fields/in_units.hpp"
+#include "fields/reconstruction.hpp"
 #include "gpureg/reconstruction.hpp"
 #include "gpureg/surface_set.hpp"
 #include "math/trigonometry.hpp"
@@ -310,8 +312,11 @@ class Refiner {
 }  // namespace
 
 RefineReport refine(const Context& context, const std::vector<Surface>& surfaces,
-                    Reconstruction& map, const RefineOptions& options) {
-  options.validate();
+                    Reconstruction& map, const RefineOptions& given) {
+  given.validate();
+  RefineOptions options = fields::in_units(given, given.voxel_size);
+  options.noise_range =
+      static_cast<double>(static_cast<float>(given.noise_range) * given.voxel_size);
   if (surfaces.size() != map.scans.size())
     throw InvalidArgument("surfaces has " + std::to_string(surfaces.size()) +
                           " entries, expected one per scan, " + std::to_string(map.scans.size()));

@@ -47,23 +47,27 @@ Surface in_frame(Surface surface, const Eigen::Vector3d& cloud_origin) {
 
 }  // namespace
 
-PrepareOptions surface_options(PrepareOptions registration) {
+RegistrationOptions surface_options(RegistrationOptions registration) {
+  PrepareOptions& prepare = registration.prepare;
   registration.voxel_size /= 2;
-  registration.depth_maps = 0;
-  registration.surface_side_distance = 0;
+  for (float* length : {&prepare.normal_radius, &prepare.feature_radius,
+                        &prepare.wide_feature_radius, &prepare.max_correspondence_distance})
+    *length *= 2;  // of these voxels: as long as before
+  prepare.depth_maps = 0;
+  prepare.surface_side_distance = 0;
   return registration;
 }
 
 Surface surface_of(const PreparedCloud& cloud) { return in_frame(rows_of(cloud), cloud.origin()); }
 
 Surface surface_of(const Context& context, PointCloudView cloud,
-                   const PrepareOptions& registration) {
+                   const RegistrationOptions& registration) {
   const WithoutFeatures without(cloud.size);
   const PreparedCloud prepared = prepare(context, without.of(cloud), surface_options(registration));
   Surface surface = rows_of(prepared);
   if (prepared.statistics().flat) {
     const auto plane = find_scan_plane(cloud.points, cloud.size, cloud.point_stride);
-    if (plane) keep_scan(*plane, layer_distance(prepared.options()), surface);
+    if (plane) keep_scan(*plane, layer_distance(prepared.settings()), surface);
   }
   return in_frame(std::move(surface), prepared.origin());
 }

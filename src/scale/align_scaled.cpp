@@ -7,6 +7,7 @@
 
 #include "api/access.hpp"
 #include "api/name_cloud.hpp"
+#include "api/with_settings.hpp"
 #include "common/stop_scope.hpp"
 #include "common/validate.hpp"
 #include "gpureg/registration/scale.hpp"
@@ -15,14 +16,13 @@
 namespace gpureg {
 namespace {
 
-void check(const ScaleRange& range, const RegistrationOptions& options) {
+void check(const ScaleRange& range, const RegistrationSettings& options) {
   range.validate();
-  options.validate();
   if (range.is_known()) return;
   require(options.method == RegistrationMethod::compatibility, "method", to_string(options.method),
           "compatibility: only it can search the scale");
-  require(options.prepare.voxel_size > 0, "prepare.voxel_size", options.prepare.voxel_size,
-          "more than 0 where the scale is searched");
+  require(options.prepare.voxel_size > 0, "prepare.downsample", "false",
+          "true where the scale is searched");
 }
 
 ScaledResult of_known(RegistrationResult&& result, double scale) {
@@ -103,8 +103,9 @@ Eigen::Matrix4d ScaledResult::similarity() const {
 
 std::vector<ScaledResult> align_scaled_batch(
     const Context& context, const std::vector<PointCloudView>& clouds,
-    const std::vector<Pair>& pairs, const ScaleRange& range, const RegistrationOptions& options,
+    const std::vector<Pair>& pairs, const ScaleRange& range, const RegistrationOptions& given,
     const ScaledCallbacks& callbacks, const std::vector<std::string>& names) {
+  const RegistrationSettings options = resolve(given);
   check(range, options);
   check_names(names, clouds.size());
   for (std::size_t p = 0; p < pairs.size(); ++p)

@@ -67,7 +67,7 @@ std::vector<double> distinct(std::vector<Support> all) {
 
 std::vector<double> propose_scales(const Context& context, const PreparedLadder& source,
                                    const PreparedTarget& target, const ScaleRange& range,
-                                   const RegistrationOptions& options) {
+                                   const RegistrationSettings& options) {
   struct Task {
     std::size_t rung;
     FeatureMatches matches;

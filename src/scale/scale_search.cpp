@@ -8,6 +8,7 @@
 #include "api/access.hpp"
 #include "api/frames.hpp"
 #include "api/prepare_copies.hpp"
+#include "api/with_settings.hpp"
 #include "common/for_each_on.hpp"
 
 namespace gpureg::scale {
@@ -52,7 +53,7 @@ struct Trial {
 
 std::vector<Trial> tried(const Context& context, const PreparedLadder& source,
                          const PreparedTarget& target, const std::vector<double>& scales,
-                         const RegistrationOptions& options) {
+                         const RegistrationSettings& options) {
   std::vector<std::unique_ptr<ScaledCloud>> clouds;
   std::vector<PointCloudView> views;
   for (const double scale : scales) {
@@ -100,7 +101,7 @@ void keep_distinct(const ScaleRange& range, std::vector<Trial>& trials) {
 
 /// Tries refined scales until they settle.
 void settle(const Context& context, const PreparedLadder& source, const PreparedTarget& target,
-            const ScaleRange& range, const RegistrationOptions& options,
+            const ScaleRange& range, const RegistrationSettings& options,
             std::vector<Trial>& trials) {
   for (int round = 0; round < kRounds; ++round) {
     keep_distinct(range, trials);
@@ -156,9 +157,9 @@ void refuse(ScaledResult& out, RegistrationReason reason) {
 }  // namespace
 
 PreparedLadder::PreparedLadder(const Context& context, const PointCloudView& source,
-                               const ScaleRange& range, const PrepareOptions& options)
+                               const ScaleRange& range, const PrepareSettings& options)
     : source_(source) {
-  PrepareOptions prepare = options;
+  PrepareSettings prepare = options;
   prepare.surface_side_distance = 0;                   // matches need neither this ...
   if (prepare.depth_maps > 0) prepare.depth_maps = 1;  // ... nor free space
   std::vector<std::unique_ptr<ScaledCloud>> clouds;
@@ -185,8 +186,8 @@ PreparedLadder::PreparedLadder(const Context& context, const PointCloudView& sou
           {scales[k], prepared[k], Access::state(prepared[k])->copy_points_and_normals()});
 }
 
-PrepareOptions search_options(const PreparedCloud& target, const RegistrationOptions& options) {
-  PrepareOptions out = options.prepare;
+PrepareSettings search_options(const PreparedCloud& target, const RegistrationSettings& options) {
+  PrepareSettings out = options.prepare;
   constexpr float kLonger = 1.5f;
   for (std::size_t points = target.size(); points > kMostTargetPoints;
        points = static_cast<std::size_t>(static_cast<double>(points) / (kLonger * kLonger)))
@@ -207,7 +208,7 @@ ClosestSurface surface_of(const PreparedCloud& cloud, float distance) {
 }  // namespace
 
 PreparedTarget::PreparedTarget(const Context& context, const PointCloudView& target,
-                               const RegistrationOptions& options)
+                               const RegistrationSettings& options)
     : cloud(prepare(context, target, options.prepare)),
       search(search_options(cloud, options)),
       coarse(search.voxel_size == options.prepare.voxel_size ? cloud
@@ -217,7 +218,7 @@ PreparedTarget::PreparedTarget(const Context& context, const PointCloudView& tar
 
 ScaledResult search_scale(const Context& context, const PreparedLadder& source,
                           const PreparedTarget& target, const ScaleRange& range,
-                          const RegistrationOptions& options) {
+                          const RegistrationSettings& options) {
   ScaledResult out;
   const std::vector<double> scales = propose_scales(context, source, target, range, options);
   if (scales.empty()) {

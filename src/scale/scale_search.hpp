@@ -8,20 +8,21 @@
 #include "pipeline/prepared_state.hpp"
 #include "scale/ladder.hpp"
 #include "scale/refine.hpp"
+#include "settings/settings.hpp"
 
 namespace gpureg::scale {
 
 /// Options of the preparation for the search of scales: with more than kMostTargetPoints points of
 /// the target, all lengths are longer by a power of 1.5.
 constexpr std::size_t kMostTargetPoints = 12'000;
-PrepareOptions search_options(const PreparedCloud& target, const RegistrationOptions& options);
+PrepareSettings search_options(const PreparedCloud& target, const RegistrationSettings& options);
 
 /// A source at the rungs of the ladder.
 class PreparedLadder {
  public:
   /// options: search_options() of the targets.
   PreparedLadder(const Context& context, const PointCloudView& source, const ScaleRange& range,
-                 const PrepareOptions& options);
+                 const PrepareSettings& options);
 
   struct Rung {
     double scale;
@@ -39,24 +40,24 @@ class PreparedLadder {
 /// A target for any number of ladders.
 struct PreparedTarget {
   PreparedCloud cloud;
-  PrepareOptions search;    ///< see search_options()
+  PrepareSettings search;   ///< see search_options()
   PreparedCloud coarse;     ///< prepared with them
   PointsAndNormals points;  ///< of coarse
   ClosestSurface surface;   ///< of cloud
 
   PreparedTarget(const Context& context, const PointCloudView& target,
-                 const RegistrationOptions& options);
+                 const RegistrationSettings& options);
 };
 
 /// Scales that the matches of the rungs agree on, the best-supported first. The ladder is one of
 /// the search options of the target.
 std::vector<double> propose_scales(const Context& context, const PreparedLadder& source,
                                    const PreparedTarget& target, const ScaleRange& range,
-                                   const RegistrationOptions& options);
+                                   const RegistrationSettings& options);
 
 /// The pair at the most confident scale.
 ScaledResult search_scale(const Context& context, const PreparedLadder& source,
                           const PreparedTarget& target, const ScaleRange& range,
-                          const RegistrationOptions& options);
+                          const RegistrationSettings& options);
 
 }  // namespace gpureg::scale

@@ -28,7 +28,7 @@ class FragmentAligner::State {
   State(Context context, const FragmentSet& fragments, RegistrationOptions options,
         std::size_t memory)
       : context_(std::move(context)),
-        preparer_(context_, fragments, options.prepare),
+        preparer_(context_, fragments, options),
         options_(options),
         memory_(memory) {}
 

@@ -229,7 +229,7 @@ std::string fingerprint_of(const PointCloudView& view) {
 }
 
 std::vector<PreparedFragment> prepare_all(const Context& context, const FragmentSet& fragments,
-                                          const PrepareOptions& options,
+                                          const RegistrationOptions& options,
                                           const SetCallbacks& callbacks) {
   options.validate();
   std::vector<std::size_t> all(fragments.size());

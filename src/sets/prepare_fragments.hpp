@@ -13,7 +13,7 @@ namespace gpureg::sets {
 /// Prepares fragments of a set without the parts that are fixed to the sensor.
 class Preparer {
  public:
-  Preparer(const Context& context, const FragmentSet& fragments, const PrepareOptions& options)
+  Preparer(const Context& context, const FragmentSet& fragments, const RegistrationOptions& options)
       : context_(context), fragments_(fragments), options_(options) {}
 
   /// Takes these fragments in their order, in chunks that fill a device and take little memory.
@@ -34,7 +34,7 @@ class Preparer {
 
   Context context_;
   const FragmentSet& fragments_;
-  PrepareOptions options_;
+  RegistrationOptions options_;
   std::optional<FixedParts> parts_;
 };
 

@@ -26,6 +26,8 @@ void add(Settings& out, const std::string& group, const T& object) {
       out.emplace_back(group + name, to_string(value));
     else if constexpr (std::is_same_v<M, bool>)
       out.emplace_back(group + name, value ? "true" : "false");
+    else if constexpr (std::is_same_v<M, std::string>)
+      out.emplace_back(group + name, value);
     else
       out.emplace_back(group + name, shortest(value));
   });

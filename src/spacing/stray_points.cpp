@@ -71,7 +71,7 @@ struct Box {
   }
 };
 
-ClosestGeometry geometry_of(const Box& box, const PrepareOptions& options) {
+ClosestGeometry geometry_of(const Box& box, const PrepareSettings& options) {
   return closest_geometry(options.max_correspondence_distance,
                           0.5f * static_cast<float>(box.diagonal()));
 }
@@ -172,7 +172,7 @@ struct CellRows {
 };
 
 /// Centroids within the normal radius of each other are of voxels in neighbouring cells.
-CellRows sort_into_cells(const RawCloud& raw, const Box& box, const PrepareOptions& options) {
+CellRows sort_into_cells(const RawCloud& raw, const Box& box, const PrepareSettings& options) {
   const double voxel = static_cast<double>(options.voxel_size);
   const Lattice voxels(box, voxel > 0 ? voxel : 1),
       cells(box, static_cast<double>(options.normal_radius) + voxel);
@@ -223,7 +223,7 @@ std::vector<std::uint32_t> voxels_around(const CellRows& cells) {
 
 /// Rows that are neither stray nor invalid, ascending.
 std::vector<std::uint32_t> rows_with_neighbors(const RawCloud& raw, const Box& box,
-                                               const PrepareOptions& options) {
+                                               const PrepareSettings& options) {
   const CellRows cells = sort_into_cells(raw, box, options);
   const std::vector<std::uint32_t> around = voxels_around(cells);
   std::vector<std::uint32_t> rows;
@@ -240,7 +240,7 @@ std::string extent_of(const Box& box) {
 }
 
 /// As pipeline::check_density() says it of a cloud without other points.
-[[noreturn]] void throw_isolated(const Box& box, const PrepareOptions& options) {
+[[noreturn]] void throw_isolated(const Box& box, const PrepareSettings& options) {
   throw InvalidArgument("nearly all of " + std::to_string(box.finite) +
                         " points are isolated within normal_radius " +
                         shown(options.normal_radius) + ", in " + extent_of(box) + ": " +
@@ -250,7 +250,7 @@ std::string extent_of(const Box& box) {
 }
 
 [[noreturn]] void throw_too_wide(const Box& box, std::uint64_t stray,
-                                 const PrepareOptions& options) {
+                                 const PrepareSettings& options) {
   throw InvalidArgument(
       std::to_string(box.finite) + " points in " + extent_of(box) + ", " + std::to_string(stray) +
       " of them without two others within normal_radius " + shown(options.normal_radius) +
@@ -261,7 +261,7 @@ std::string extent_of(const Box& box) {
 
 }  // namespace
 
-WithoutStrayPoints::WithoutStrayPoints(const RawCloud& raw, const PrepareOptions& options)
+WithoutStrayPoints::WithoutStrayPoints(const RawCloud& raw, const PrepareSettings& options)
     : kept_(raw), input_points_(raw.size) {
   const std::uint64_t most = std::max<std::uint64_t>(
       limits::kMaxClosestBlocks,

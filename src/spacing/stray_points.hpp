@@ -17,7 +17,7 @@ class WithoutStrayPoints {
   /// raw: rows in host memory.
   /// @throws InvalidArgument where nearly all points are stray, or where the others exceed the
   ///   limit, too.
-  WithoutStrayPoints(const RawCloud& raw, const PrepareOptions& options);
+  WithoutStrayPoints(const RawCloud& raw, const PrepareSettings& options);
 
   /// Valid as long as this object and the rows given to it.
   const RawCloud& cloud() const { return kept_.cloud(); }

@@ -117,7 +117,7 @@ struct Replacement {
 
 /// What a cloud that is prepared from prepared points takes over from them.
 struct Inheritance {
-  PrepareOptions options;
+  PrepareSettings options;
   PrepareStatistics statistics;
   float origin[3];
   double frame_offset[3];
@@ -230,7 +230,7 @@ void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& stat
 
 UnknownViewpoints::UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
                                      const std::vector<CloudKnowledge>& knowledge,
-                                     const PrepareOptions& options, std::vector<double> scales)
+                                     const PrepareSettings& options, std::vector<double> scales)
     : engine_(engine),
       raw_(raw),
       knowledge_(knowledge),
@@ -386,7 +386,7 @@ void UnknownViewpoints::prepare_again(std::vector<std::shared_ptr<PreparedState>
   }
   if (replacements.empty()) return;
   for (const Replacement& replacement : replacements) inputs.push_back(replacement.raw());
-  PrepareOptions as_they_are = options_;
+  PrepareSettings as_they_are = options_;
   as_they_are.voxel_size = 0;
   std::vector<std::shared_ptr<PreparedState>> prepared;
   const auto runs = pipeline::runs_within(inheritances.size(), kPointsTogether, [&](std::size_t k) {

@@ -42,7 +42,7 @@ class UnknownViewpoints {
   /// @param raw rows of the points in host memory, which have to outlive this.
   /// @param scales of clouds that are copies of one: one of them decides for all; otherwise none.
   UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
-                    const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options,
+                    const std::vector<CloudKnowledge>& knowledge, const PrepareSettings& options,
                     std::vector<double> scales = {});
 
   /// Calls prepare(watcher), and meanwhile decides about the clouds whose surfaces the watcher
@@ -74,7 +74,7 @@ class UnknownViewpoints {
   Engine& engine_;
   Span<const RawCloud> raw_;
   const std::vector<CloudKnowledge>& knowledge_;
-  const PrepareOptions& options_;
+  const PrepareSettings& options_;
   std::vector<double> scales_;
   std::vector<std::optional<SpacingSpread>> spread_;  ///< of each cloud, once measured
   std::vector<Decision> decisions_;                   ///< about each cloud

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include "api/with_settings.hpp"
 #include "gpureg/registration.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg {
 namespace {
 
-RegistrationOptions quick() {
-  RegistrationOptions o = RegistrationOptions::from_voxel_size(0.08f);
+RegistrationSettings quick() {
+  RegistrationSettings o = resolve(RegistrationOptions{0.08f});
   o.quadruples.count = 300000;
   return o;
 }
@@ -61,7 +62,7 @@ TEST(Align, SourceAndTargetAreNotMixedUp) {
   std::vector<Eigen::Vector3f> source = test::moved(pose.inverse(), target);
   // Both ways round, and with either cloud the smaller one: the engine swaps inside.
   for (const bool smaller_as_source : {false, true}) {
-    RegistrationOptions o = quick().with_quality(7);
+    RegistrationSettings o = quick().with_quality(7);
     o.smaller_as_source = smaller_as_source;
     // The last quarter of the points is furniture that one scan alone has: the free space speaks
     // against every pose.
@@ -105,7 +106,7 @@ TEST(Align, StridesAndNormalsOfTheInputAreUsed) {
   EXPECT_EQ(a.normals(), b.normals());
   strided.normals = interleaved.data() + 4;
   strided.normal_stride = 7;
-  PrepareOptions as_given;
+  PrepareSettings as_given;
   as_given.depth_maps = 0;  // normals of one direction contradict each other, and stay so
   for (const Eigen::Vector3f& n : prepare(context, strided, as_given).normals())
     EXPECT_LE(n.z(), 1e-6f);
@@ -118,7 +119,7 @@ TEST(AlignBatch, ReportsEveryPairInOrderAndCanBeStopped) {
   std::vector<std::vector<Eigen::Vector3f>> scans;
   for (int k = 0; k < 4; ++k) scans.push_back(test::scan_room(random));
   for (const auto& s : scans) views.emplace_back(s);
-  RegistrationOptions o = RegistrationOptions::from_voxel_size(0.15f);
+  RegistrationSettings o = resolve(RegistrationOptions{0.15f});
   o.quadruples.count = 300;
   const std::vector<PreparedCloud> clouds = prepare_batch(context, views, o.prepare);
   std::vector<Pair> pairs;

@@ -14,17 +14,16 @@ TEST(Async, FuturesHoldTheResults) {
   std::mt19937 random(4);
   const auto a = test::scan_room(random),
              b = test::moved(test::random_pose(random), test::scan_room(random));
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.1f);
-  options.quadruples.count = 5000;
+  RegistrationOptions options{0.1f};
+  options.quadruples = 5000;
   const Context context = Context::cpu(2);
-  const auto clouds =
-      prepare_batch(context, {PointCloudView(a), PointCloudView(b)}, options.prepare);
+  const auto clouds = prepare_batch(context, {PointCloudView(a), PointCloudView(b)}, options);
   const auto expected = test::bytes(align(context, clouds[0], clouds[1], options));
   auto one = align_async(context, clouds[0], clouds[1], options);
   auto many = align_batch_async(context, clouds, {{0, 1}, {0, 1}}, options);
   EXPECT_EQ(test::bytes(one.get()), expected);
   for (const RegistrationResult& result : many.get()) EXPECT_EQ(test::bytes(result), expected);
-  options.quadruples.count = 0;
+  options.quadruples = 0;
   auto bad = align_async(context, clouds[0], clouds[1], options);
   EXPECT_THROW(bad.get(), InvalidArgument);
 }

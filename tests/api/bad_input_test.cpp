@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "api/with_settings.hpp"
 #include "gpureg/registration.hpp"
 #include "support/expect_error.hpp"
 #include "support/scan.hpp"
@@ -12,8 +13,8 @@
 namespace gpureg {
 namespace {
 
-RegistrationOptions quick() {
-  RegistrationOptions o = RegistrationOptions::from_voxel_size(0.08f);
+RegistrationSettings quick() {
+  RegistrationSettings o = resolve(RegistrationOptions{0.08f});
   o.quadruples.count = 20000;
   return o;
 }
@@ -82,7 +83,7 @@ TEST(BadInput, NoOverlapIsNotAligned) {
   std::vector<Eigen::Vector3f> sphere;
   for (int k = 0; k < 20000; ++k)
     sphere.push_back(Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
-  RegistrationOptions options = quick();
+  RegistrationSettings options = quick();
   options.quadruples.min_inlier_ratio = 0.9f;
   const std::vector<Eigen::Vector3f> corner = room();
   const RegistrationResult r =
@@ -97,7 +98,7 @@ TEST(BadInput, TenKilometresAway) {
   const std::vector<Eigen::Vector3f> a = test::scan_room(random), b = test::scan_room(random);
   std::vector<Eigen::Vector3f> far;
   for (const Eigen::Vector3f& p : b) far.push_back(p + Eigen::Vector3f(10000, -10000, 5000));
-  RegistrationOptions options = quick();
+  RegistrationSettings options = quick();
   options.quadruples.count = 50000;
   const RegistrationResult r =
       align(Context::cpu(2), PointCloudView(a), PointCloudView(far), options);
@@ -174,7 +175,7 @@ TEST(BadInput, AbsurdScaleAndDensityAreErrorsNotHangs) {
   std::uniform_real_distribution<float> place(0, 0.01f);
   std::vector<Eigen::Vector3f> dense(100000);
   for (Eigen::Vector3f& p : dense) p = Eigen::Vector3f(place(random), place(random), place(random));
-  PrepareOptions keep;
+  PrepareSettings keep;
   keep.voxel_size = 0;
   test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(dense), keep); },
                                       {"feature_radius"});
@@ -200,13 +201,14 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
       {"clouds[1]: nearly all"});
   test::expect_error<InvalidArgument>(
       [&] {
-        prepare_batch(context, {PointCloudView(good), PointCloudView(points)}, {},
-                      {"kitchen", "hall"});
+        prepare_batch(context, {PointCloudView(good), PointCloudView(points)},
+                      RegistrationOptions{}, {"kitchen", "hall"});
       },
       {"hall: nearly all"});
   test::expect_error<InvalidArgument>(
       [&] {
-        prepare_batch(context, {PointCloudView(good), PointCloudView(good)}, {}, {"kitchen"});
+        prepare_batch(context, {PointCloudView(good), PointCloudView(good)}, RegistrationOptions{},
+                      {"kitchen"});
       },
       {"names has 1 entries", "2"});
   test::expect_error<InvalidArgument>(
@@ -218,8 +220,7 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
                                       {"target: cloud.point_stride"});
   // By the points' own unit all is as before; and few points cost little.
   EXPECT_GT(
-      prepare(context, PointCloudView(points), RegistrationOptions::from_voxel_size(50).prepare)
-          .size(),
+      prepare(context, PointCloudView(points), resolve(RegistrationOptions{50}).prepare).size(),
       1000u);
   points.resize(3000);
   EXPECT_EQ(prepare(context, PointCloudView(points)).size(), 3000u);
@@ -229,7 +230,7 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
   for (int x = 0; x < 150; ++x)
     for (int y = 0; y < 150; ++y)
       wide.emplace_back(0.3f * static_cast<float>(x), 0.3f * static_cast<float>(y), 0.0f);
-  PrepareOptions far;
+  PrepareSettings far;
   far.max_correspondence_distance = 0.5f;
   EXPECT_EQ(prepare(context, PointCloudView(wide), far).size(), 22500u);
 }
@@ -245,7 +246,7 @@ TEST(BadInput, SoFewPointsThatAnyPoseWouldDo) {
         b.emplace_back(unit(random), unit(random), unit(random));
       }
       const auto options =
-          RegistrationOptions::from_voxel_size(std::pow(1.0f / static_cast<float>(n), 1.0f / 3));
+          resolve(RegistrationOptions{std::pow(1.0f / static_cast<float>(n), 1.0f / 3)});
       const RegistrationResult r =
           align(Context::cpu(1), PointCloudView(a), PointCloudView(b), options);
       EXPECT_FALSE(r.aligned()) << n << " points, " << r.score;
@@ -256,9 +257,8 @@ TEST(BadInput, HugeVoxelLeavesTooFewPoints) {
   // Away from the origin, where eight voxels meet whatever their size.
   std::vector<Eigen::Vector3f> points = room();
   for (Eigen::Vector3f& p : points) p += Eigen::Vector3f(10, 10, 10);
-  const RegistrationResult r =
-      align(Context::cpu(1), PointCloudView(points), PointCloudView(points),
-            RegistrationOptions::from_voxel_size(1000));
+  const RegistrationResult r = align(Context::cpu(1), PointCloudView(points),
+                                     PointCloudView(points), resolve(RegistrationOptions{1000}));
   EXPECT_EQ(r.reason, RegistrationReason::too_few_source_points);
 }
 
@@ -272,7 +272,7 @@ TEST(BadInput, HandlesIndicesAndDistances) {
                                       {"clouds[0]"});
   test::expect_error<InvalidArgument>([&] { align_batch(context, {cloud}, {{0, 1}}); },
                                       {"pairs[0]", "cloud 1"});
-  RegistrationOptions far = RegistrationOptions::from_voxel_size(0.2f);
+  RegistrationSettings far = resolve(RegistrationOptions{0.2f});
   test::expect_error<InvalidArgument>([&] { align(context, cloud, cloud, far); },
                                       {"max_correspondence_distance"});
   test::expect_error<InvalidArgument>(

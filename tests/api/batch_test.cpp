@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "api/access.hpp"
+#include "api/with_settings.hpp"
 #include "gpureg/registration.hpp"
 #include "support/expect_error.hpp"
 #include "support/result_bytes.hpp"
@@ -31,12 +32,12 @@ class IdleHostEngine final : public Engine {
   bool leaves_host_idle() const override { return idle_; }
   std::string description() const override { return cpu_->description(); }
   const void* memory() const override { return cpu_->memory(); }
-  std::size_t pairs_per_chunk(const RegistrationOptions&) const override { return chunk_; }
+  std::size_t pairs_per_chunk(const RegistrationSettings&) const override { return chunk_; }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareOptions& options) override {
+                                                      const PrepareSettings& options) override {
     return cpu_->prepare(clouds, options);
   }
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+  void align(Span<const PairInput> pairs, const RegistrationSettings& options,
              Span<PairOutcome> outcomes) override {
     const std::size_t call = calls++;
     sizes.push_back(pairs.size);
@@ -44,11 +45,11 @@ class IdleHostEngine final : public Engine {
     cpu_->align(pairs, options, outcomes);
   }
   std::vector<FeatureMatches> match(Span<const PairInput> pairs,
-                                    const RegistrationOptions& options) override {
+                                    const RegistrationSettings& options) override {
     return cpu_->match(pairs, options);
   }
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
-              const RegistrationOptions& options, bool refine,
+              const RegistrationSettings& options, bool refine,
               Span<PairOutcome> outcomes) override {
     cpu_->verify(pairs, poses, options, refine, outcomes);
   }
@@ -71,7 +72,7 @@ class IdleHostEngine final : public Engine {
 
 class BatchOfChunks : public testing::Test {
  protected:
-  BatchOfChunks() : options(RegistrationOptions::from_voxel_size(0.12f)) {
+  BatchOfChunks() : options(resolve(RegistrationOptions{0.12f})) {
     options.compatibility.seeds = 128;
     options.compatibility.max_matches = 1024;
     prepare(5, true);
@@ -124,7 +125,7 @@ class BatchOfChunks : public testing::Test {
     }
   }
 
-  RegistrationOptions options;
+  RegistrationSettings options;
   std::vector<PreparedCloud> clouds;
   std::vector<Pair> pairs;  ///< ten
   std::vector<RegistrationResult> expected;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/context.hpp"
+#include "api/with_settings.hpp"
 
 #include <gtest/gtest.h>
 
@@ -33,7 +34,7 @@ TEST(Context, CloudsOfOneCpuContextGoWithAnother) {
   const std::vector<Eigen::Vector3f> points = test::scan_room(random);
   const PreparedCloud a = prepare(Context::cpu(1), PointCloudView(points)),
                       b = prepare(Context::cpu(2), PointCloudView(points));
-  RegistrationOptions options;
+  RegistrationSettings options;
   options.quadruples.count = 1000;
   EXPECT_NO_THROW(align(Context::cpu(1), a, b, options));
 }
@@ -42,7 +43,7 @@ TEST(Context, SharedByTwoThreads) {
   std::mt19937 random(2);
   const std::vector<Eigen::Vector3f> points = test::scan_room(random);
   const Context context = Context::cpu(2);
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.12f);
+  RegistrationSettings options = resolve(RegistrationOptions{0.12f});
   const PreparedCloud cloud = prepare(context, PointCloudView(points), options.prepare);
   options.quadruples.count = 500;
   const Eigen::Matrix4d expected =

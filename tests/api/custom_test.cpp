@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include "api/with_settings.hpp"
 #include "gpureg/registration.hpp"
 #include "support/expect_error.hpp"
 #include "support/scan.hpp"
@@ -18,8 +19,8 @@ struct TwoScans {
   std::vector<Eigen::Vector3f> source, target;
 };
 
-RegistrationOptions keep_points() {
-  RegistrationOptions o = RegistrationOptions::from_voxel_size(0.05f);
+RegistrationSettings keep_points() {
+  RegistrationSettings o = resolve(RegistrationOptions{0.05f});
   o.prepare.voxel_size = 0;
   o.quadruples.count = 20000;
   o.smaller_as_source = false;
@@ -80,7 +81,7 @@ TEST(CustomCorrespondences, HalfOfThemWrong) {
   const Context context = Context::cpu(2);
   TwoScans scans(8);
   const std::vector<Eigen::Vector3f> source = thin(scans.source), target = thin(scans.target);
-  const RegistrationOptions options = keep_points();
+  const RegistrationSettings options = keep_points();
   const PreparedCloud a = prepare(context, PointCloudView(source), options.prepare),
                       b = prepare(context, PointCloudView(target), options.prepare);
   std::vector<Correspondence> correspondences;

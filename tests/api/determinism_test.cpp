@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "api/with_settings.hpp"
 #include "gpureg/registration.hpp"
 #include "support/result_bytes.hpp"
 #include "support/scan.hpp"
@@ -14,7 +15,7 @@ using test::bytes;
 
 class Determinism : public ::testing::Test {
  protected:
-  Determinism() : options(RegistrationOptions::from_voxel_size(0.12f)) {
+  Determinism() : options(resolve(RegistrationOptions{0.12f})) {
     options.quadruples.count = 2000;
     options.seed = 42;
     std::mt19937 random(1);
@@ -32,7 +33,7 @@ class Determinism : public ::testing::Test {
       out.push_back(bytes(r));
     return out;
   }
-  RegistrationOptions options;
+  RegistrationSettings options;
   std::vector<std::vector<Eigen::Vector3f>> scans;
   std::vector<PointCloudView> views;
   std::vector<Pair> pairs;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "api/access.hpp"
+#include "api/with_settings.hpp"
 #include "common/in_halves.hpp"
 #include "gpureg/registration.hpp"
 #include "support/scan.hpp"
@@ -25,13 +26,13 @@ class WatchedEngine final : public Engine {
   bool leaves_host_idle() const override { return true; }
   std::string description() const override { return cpu_->description(); }
   const void* memory() const override { return cpu_->memory(); }
-  std::size_t pairs_per_chunk(const RegistrationOptions&) const override { return 8; }
+  std::size_t pairs_per_chunk(const RegistrationSettings&) const override { return 8; }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareOptions& options) override {
+                                                      const PrepareSettings& options) override {
     return cpu_->prepare(clouds, options);
   }
   std::vector<std::shared_ptr<PreparedState>> prepare_watched(
-      Span<const RawCloud> clouds, const PrepareOptions& options,
+      Span<const RawCloud> clouds, const PrepareSettings& options,
       const SurfaceWatcher& watcher) override {
     auto states = cpu_->prepare(clouds, options);
     for (std::size_t k = 0; k < states.size(); k += stride_) {
@@ -44,11 +45,11 @@ class WatchedEngine final : public Engine {
     if (fails_ && clouds.size > 1) throw BatchTooLarge("a batch");
     return states;
   }
-  void align(Span<const PairInput>, const RegistrationOptions&, Span<PairOutcome>) override {}
-  std::vector<FeatureMatches> match(Span<const PairInput>, const RegistrationOptions&) override {
+  void align(Span<const PairInput>, const RegistrationSettings&, Span<PairOutcome>) override {}
+  std::vector<FeatureMatches> match(Span<const PairInput>, const RegistrationSettings&) override {
     return {};
   }
-  void verify(Span<const PairInput>, const std::vector<PosesOfPair>&, const RegistrationOptions&,
+  void verify(Span<const PairInput>, const std::vector<PosesOfPair>&, const RegistrationSettings&,
               bool, Span<PairOutcome>) override {}
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays>) override {
     return nullptr;
@@ -104,7 +105,7 @@ class EarlySurfaces : public testing::Test {
       expect_equal(*Access::state(prepared[k]), *Access::state(expected[k]));
   }
 
-  PrepareOptions options = RegistrationOptions::from_voxel_size(0.12f).prepare;
+  PrepareSettings options = resolve(RegistrationOptions{0.12f}).prepare;
   std::vector<PointCloud> clouds;
   std::vector<PointCloudView> views;
   std::vector<PreparedCloud> expected;

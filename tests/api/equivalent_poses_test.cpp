@@ -94,7 +94,7 @@ RegistrationResult registered(bool symmetric, const Eigen::Isometry3d& truth,
 
 TEST(EquivalentPoses, HalfATurnIsFoundAndCounted) {
   std::mt19937 random(3);
-  const auto options = RegistrationOptions::from_voxel_size(0.02f);
+  const auto options = RegistrationOptions{0.02f};
   const Eigen::Isometry3d turn(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
   for (int k = 0; k < 3; ++k) {
     const Eigen::Isometry3d truth = random_pose(random);
@@ -120,7 +120,7 @@ TEST(EquivalentPoses, HalfATurnIsFoundAndCounted) {
 TEST(EquivalentPoses, APartWithoutSymmetryHasNone) {
   std::mt19937 random(4);
   const RegistrationResult result =
-      registered(false, random_pose(random), RegistrationOptions::from_voxel_size(0.02f));
+      registered(false, random_pose(random), RegistrationOptions{0.02f});
   EXPECT_EQ(result.equivalent_poses(), 1u);
   EXPECT_EQ(result.symmetry_confidence(), result.score);
   EXPECT_NE(result.reason, RegistrationReason::symmetric);
@@ -129,7 +129,7 @@ TEST(EquivalentPoses, APartWithoutSymmetryHasNone) {
 TEST(EquivalentPoses, UsersSayWhetherTheyAcceptThem) {
   std::mt19937 random(5);
   const Eigen::Isometry3d truth = random_pose(random);
-  auto options = RegistrationOptions::from_voxel_size(0.02f);
+  auto options = RegistrationOptions{0.02f};
   const double together = registered(true, truth, options).symmetry_confidence();
   ASSERT_GT(together, 0);
   // Between the confidence of one pose and that of both.

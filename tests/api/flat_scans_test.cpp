@@ -61,7 +61,7 @@ Points patch(float width, float depth, int points, float noise, bool even) {
 
 RegistrationResult registered(const Points& source, const Points& target, unsigned threads = 2) {
   return align(Context::cpu(threads), PointCloudView(source), PointCloudView(target),
-               RegistrationOptions::from_voxel_size(0.05f));
+               RegistrationOptions{0.05f});
 }
 
 TEST(FlatScans, AreRecognised) {
@@ -112,7 +112,7 @@ TEST(FlatScans, AClosedRoomIsNoModel) {
   const Eigen::Isometry3d pose = test::pose_in_plan(-1.1, -0.7, 1.4);
   const Points scan = test::FloorPlan2d().scan(pose, 3);
   const Context context = Context::cpu(2);
-  const PrepareOptions options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  const RegistrationOptions options{0.05f};
   const auto viewpoint_of = [&](const Points& points) {
     return prepare(context, PointCloudView(points), options).statistics().viewpoint;
   };
@@ -174,10 +174,10 @@ TEST(FlatScans, TheEvidenceIsThatOfThePlanarPose) {
   const Context context = Context::cpu(2);
   // The layers let these drift out of their plane, each at its own voxel size.
   for (const float voxel : {0.05f, 0.08f, 0.12f, 0.15f}) {
-    RegistrationOptions options = RegistrationOptions::from_voxel_size(voxel);
+    RegistrationOptions options{voxel};
     options.min_confidence = 0;
-    const auto source = prepare(context, PointCloudView(first_scan()), options.prepare),
-               target = prepare(context, PointCloudView(second_scan()), options.prepare);
+    const auto source = prepare(context, PointCloudView(first_scan()), options),
+               target = prepare(context, PointCloudView(second_scan()), options);
     const RegistrationResult found = align(context, source, target, options);
     ASSERT_EQ(found.reason, RegistrationReason::none);
     std::vector<UnalignedIsometry3d> poses;
@@ -234,8 +234,8 @@ TEST(FlatScans, NormalsAcrossThePlaneAreIgnored) {
   const Points up(source.size(), Eigen::Vector3f::UnitZ());
   PointCloudView with(source);
   with.normals = up.front().data();
-  const RegistrationResult result = align(Context::cpu(2), with, PointCloudView(target),
-                                          RegistrationOptions::from_voxel_size(0.05f));
+  const RegistrationResult result =
+      align(Context::cpu(2), with, PointCloudView(target), RegistrationOptions{0.05f});
   EXPECT_TRUE(result.aligned()) << result.score;
 }
 
@@ -255,7 +255,7 @@ TEST(FlatScans, OfAnotherPlaceAreUnlikelyWithoutAThreshold) {
     circle.emplace_back(3 * std::cos(angle),
                         3 * std::sin(angle) + 0.001f * static_cast<float>(k % 7), 0.0f);
   }
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
+  RegistrationOptions options{0.05f};
   options.min_confidence = 0;
   const RegistrationResult result =
       align(Context::cpu(2), PointCloudView(first_scan()), PointCloudView(circle), options);

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "api/access.hpp"
+#include "api/with_settings.hpp"
 #include "common/in_halves.hpp"
 #include "gpureg/registration.hpp"
 #include "gpureg/verification.hpp"
@@ -25,13 +26,13 @@ class LimitedEngine final : public Engine {
   unsigned threads() const override { return cpu_->threads(); }
   std::string description() const override { return cpu_->description(); }
   const void* memory() const override { return cpu_->memory(); }
-  std::size_t pairs_per_chunk(const RegistrationOptions&) const override { return 100; }
+  std::size_t pairs_per_chunk(const RegistrationSettings&) const override { return 100; }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareOptions& options) override {
+                                                      const PrepareSettings& options) override {
     check(clouds.size);
     return cpu_->prepare(clouds, options);
   }
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+  void align(Span<const PairInput> pairs, const RegistrationSettings& options,
              Span<PairOutcome> outcomes) override {
     // What a part that fails leaves behind must not show.
     for (PairOutcome& outcome : outcomes) outcome.modes.emplace_back();
@@ -39,12 +40,12 @@ class LimitedEngine final : public Engine {
     cpu_->align(pairs, options, outcomes);
   }
   std::vector<FeatureMatches> match(Span<const PairInput> pairs,
-                                    const RegistrationOptions& options) override {
+                                    const RegistrationSettings& options) override {
     check(pairs.size);
     return cpu_->match(pairs, options);
   }
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
-              const RegistrationOptions& options, bool refine,
+              const RegistrationSettings& options, bool refine,
               Span<PairOutcome> outcomes) override {
     for (PairOutcome& outcome : outcomes) outcome.modes.emplace_back();
     check(pairs.size);
@@ -74,7 +75,7 @@ class LimitedEngine final : public Engine {
 
 class JointLimits : public testing::TestWithParam<bool> {
  protected:
-  JointLimits() : options(RegistrationOptions::from_voxel_size(0.12f)) {
+  JointLimits() : options(resolve(RegistrationOptions{0.12f})) {
     std::mt19937 random(5);
     for (int k = 0; k < 5; ++k)
       scans.push_back(test::moved(test::random_pose(random), test::scan_room(random)));
@@ -82,7 +83,7 @@ class JointLimits : public testing::TestWithParam<bool> {
     for (std::uint32_t i = 0; i < scans.size(); ++i)
       for (std::uint32_t j = 0; j < i; ++j) pairs.push_back({i, j});
   }
-  RegistrationOptions options;
+  RegistrationSettings options;
   std::vector<std::vector<Eigen::Vector3f>> scans;
   std::vector<PointCloudView> views;
   std::vector<Pair> pairs;

@@ -93,7 +93,7 @@ TEST(Origin, PreparedCloudsKeepIt) {
 TEST(Origin, PriorsAreInTheFramesOfTheClouds) {
   const ScannedRoom pair = scanned_room(11);
   const Context context = Context::cpu(2);
-  const RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
+  const RegistrationOptions options{0.05f};
   const PreparedCloud source = prepare(context, view_of(pair.source, pair.source_eye, kUtmSource)),
                       target = prepare(context, view_of(pair.target, pair.target_eye, kUtmTarget));
   RegistrationPrior prior;

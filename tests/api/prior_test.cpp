@@ -36,7 +36,7 @@ Points cube(std::mt19937& random, int count) {
 /// Two scans of something, one of them moved: the source has fewer points where swapped is false.
 struct Scene {
   Context context = Context::cpu();
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.1f);
+  RegistrationOptions options{0.1f};
   Eigen::Isometry3d truth;  ///< target from source
   PreparedCloud source, target;
 
@@ -50,7 +50,7 @@ struct Scene {
     PointCloudView view(points);
     view.viewpoints = eye.data();
     view.viewpoint_count = 1;
-    return prepare(context, view, options.prepare);
+    return prepare(context, view, options);
   }
   RegistrationResult align(const RegistrationPrior& prior) const {
     return gpureg::align(context, source, target, prior, options);

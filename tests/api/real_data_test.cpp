@@ -25,7 +25,7 @@ TEST(RealData, RedKitchenPairs) {
   for (int k = 0; k < 4; ++k)
     raw.push_back(test::read_plain_ply(folder + "/cloud_bin_" + std::to_string(k) + ".ply"));
   for (const PointCloud& cloud : raw) views.push_back(cloud.view());
-  const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options.prepare);
+  const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options);
   int tried = 0;
   for (std::size_t k = 0; k < truth.log.size(); ++k) {
     const int i = truth.log[k].i, j = truth.log[k].j;
@@ -48,8 +48,8 @@ TEST(RealData, RedKitchenPairs) {
 TEST(RealData, FgrRangePairs) {
   GPUREG_DATA_FOLDER_OR_SKIP(folder, "fgr");
   // what `gpureg info` suggests
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.02f);
-  options.quadruples.count = 1'000'000;
+  RegistrationOptions options{0.02f};
+  options.quadruples = 1'000'000;
   const Context context = Context::cpu();
   double mean = 0, worst = 0;
   for (int k = 1; k <= 25; ++k) {
@@ -102,13 +102,13 @@ TEST(RealData, LidarPair) {
     for (int column = 0; column < 4; ++column) file >> truth.matrix()(row, column);
   ASSERT_TRUE(file);
   RegistrationOptions options = RegistrationOptions::loopsmart(0.5f);
-  options.quadruples.count = 400'000;
+  options.quadruples = 400'000;
   const Context context = Context::cpu();
   const RegistrationResult coarse = align(context, source.view(), target.view(), options);
   ASSERT_TRUE(coarse.aligned());
   EXPECT_LT(test::translation_error(truth, coarse.target_from_source), 0.3);
   EXPECT_LT(test::rotation_error_degrees(truth, coarse.target_from_source), 2);
-  options.refine.max_iterations = 20;
+  options.refine_iterations = 20;
   const RegistrationResult fine = align(context, source.view(), target.view(), options);
   std::printf("lidar: %.3f m, %.2f degrees; refined %.3f m, %.2f degrees\n",
               test::translation_error(truth, coarse.target_from_source),

@@ -4,6 +4,7 @@
 #include <limits>
 #include <random>
 
+#include "api/with_settings.hpp"
 #include "gpureg/registration.hpp"
 #include "support/expect_error.hpp"
 #include "support/scan.hpp"
@@ -36,7 +37,7 @@ Points mixed(const Points& a, const Points& b) {
   return out;
 }
 
-PreparedCloud prepared(const PointCloudView& view) { return prepare(Context::cpu(2), view, {}); }
+PreparedCloud prepared(const PointCloudView& view) { return prepare(Context::cpu(2), view); }
 
 // Each of them took 22 KB: 30,000 a gigabyte.
 TEST(StrayPoints, AreDroppedAndCountedAndLeaveTheRestAsItIs) {
@@ -96,7 +97,7 @@ TEST(StrayPoints, StayWhereTheyAreFew) {
 
 // Without downsampling every point counts.
 TEST(StrayPoints, AreDroppedFromCloudsThatAreNotDownsampled) {
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = 0;
   const Points clean = prepared(PointCloudView(room())).points();
   const Points all = mixed(clean, cube(30'000, 2000));
@@ -113,8 +114,8 @@ TEST(StrayPoints, ACloudOfNothingElseIsRefused) {
   const Points clean = room();
   test::expect_error<InvalidArgument>(
       [&] {
-        prepare_batch(Context::cpu(2), {PointCloudView(clean), PointCloudView(stray)}, {},
-                      {"room.ply", "stray.ply"});
+        prepare_batch(Context::cpu(2), {PointCloudView(clean), PointCloudView(stray)},
+                      RegistrationOptions{}, {"room.ply", "stray.ply"});
       },
       {"stray.ply: nearly all of 100000 points"});
 }
@@ -124,11 +125,11 @@ TEST(StrayPoints, WhereTheOtherPointsExceedTheMemoryTheCloudIsRefused) {
   const Points noise = cube(120'000, 12);
   test::expect_error<InvalidArgument>([&] { prepared(PointCloudView(noise)); },
                                       {"120000 points in 11.99", "larger voxel_size"});
-  PrepareOptions all;
+  PrepareSettings all;
   all.voxel_size = 0;
   test::expect_error<InvalidArgument>([&] { prepare(Context::cpu(2), PointCloudView(noise), all); },
                                       {"too few for voxel_size 0, which keeps every point"});
-  PrepareOptions larger = RegistrationOptions::from_voxel_size(0.5f).prepare;
+  PrepareSettings larger = resolve(RegistrationOptions{0.5f}).prepare;
   larger.wide_feature_radius = 0;
   EXPECT_GT(prepare(Context::cpu(2), PointCloudView(noise), larger).size(), 10'000u);
 }

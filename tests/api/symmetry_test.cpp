@@ -64,7 +64,7 @@ RegistrationResult register_moved(const Points& scanned, const Points& target,
   a.viewpoint_count = 1;
   b.viewpoints = eye.data();
   b.viewpoint_count = 1;
-  return align(Context::cpu(), a, b, RegistrationOptions::from_voxel_size(0.1f));
+  return align(Context::cpu(), a, b, RegistrationOptions{0.1f});
 }
 
 /// Error of the pose in the frame of the target: the identity for the true pose.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/time_budget.hpp"
+#include "api/with_settings.hpp"
 
 #include <gtest/gtest.h>
 
@@ -28,7 +29,7 @@ struct FakeLevels {
 
   RegistrationResult align(std::uint32_t quality) {
     run.push_back(quality);
-    const RegistrationOptions o = RegistrationOptions{}.with_quality(quality);
+    const RegistrationSettings o = resolve(RegistrationOptions{}).with_quality(quality);
     RegistrationResult result;
     result.has_candidate = true;
     result.score = confidence(quality);
@@ -51,7 +52,7 @@ struct FakeLevels {
     run.clear();
     return run_levels(
         {[this](std::uint32_t quality) { return align(quality); }, [this] { return clock; }},
-        milliseconds, RegistrationOptions{});
+        milliseconds, resolve(RegistrationOptions{}));
   }
 };
 
@@ -105,7 +106,7 @@ TEST(TimeBudget, PredictionsFollowTheStages) {
   t.rank = 4;
   t.refine = 5;
   t.verify = 6;
-  RegistrationOptions from, to;
+  RegistrationSettings from, to;
   to.compatibility.max_matches = 3 * from.compatibility.max_matches;
   to.compatibility.seeds = 2 * from.compatibility.seeds;
   to.compatibility.triangles = 3 * from.compatibility.triangles;
@@ -116,17 +117,17 @@ TEST(TimeBudget, PredictionsFollowTheStages) {
 
 TEST(TimeBudget, ResultsAreThoseOfTheirLevel) {
   const Context context = Context::cpu(2);
-  const RegistrationOptions options = RegistrationOptions::from_voxel_size(0.1f);
+  RegistrationOptions options{0.1f};
   std::mt19937 random(1);
   const std::vector<Eigen::Vector3f> a = test::scan_room(random), b = test::scan_room(random);
-  const PreparedCloud source = prepare(context, PointCloudView(a), options.prepare);
-  const PreparedCloud target = prepare(context, PointCloudView(b), options.prepare);
+  const PreparedCloud source = prepare(context, PointCloudView(a), options);
+  const PreparedCloud target = prepare(context, PointCloudView(b), options);
   // Half an hour: whatever the machine, it ends by itself, with every level or a stable pose.
   const TimedResult out = align_within(context, source, target, 1.8e6, options);
   EXPECT_GE(out.levels, 2u);
   EXPECT_GT(out.milliseconds, 0);
-  const RegistrationResult alone =
-      align(context, source, target, options.with_quality(out.quality));
+  options.quality = out.quality;
+  const RegistrationResult alone = align(context, source, target, options);
   EXPECT_EQ(test::bytes(out.result), test::bytes(alone));
 }
 
@@ -140,7 +141,8 @@ TEST(TimeBudget, BadInputIsNamed) {
       [&] { align_within(context, {}, {}, 10, RegistrationOptions::loopsmart()); },
       {"method", "quadruples"});
   test::expect_error<InvalidArgument>([&] { align_within(context, {}, {}, 10); }, {"empty handle"});
-  test::expect_error<InvalidArgument>([] { RegistrationOptions{}.with_quality(11); }, {"quality"});
+  test::expect_error<InvalidArgument>([] { resolve(RegistrationOptions{}).with_quality(11); },
+                                      {"quality"});
 }
 
 }  // namespace

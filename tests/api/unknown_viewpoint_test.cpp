@@ -120,7 +120,7 @@ std::vector<Eigen::Vector3f> street_scan(unsigned seed, double kept) {
 
 // Neighbours in a thinned scan have distances by chance: its spacing does not tell the viewpoint.
 TEST(UnknownViewpoint, AThinnedScanHasOneReturnPerDirection) {
-  PrepareOptions options = RegistrationOptions::from_voxel_size(0.8f).prepare;
+  RegistrationOptions options{0.8f};
   const auto decisions = [&](bool move) {
     std::mt19937 random(6);
     std::map<ViewpointSource, int> out;
@@ -245,7 +245,7 @@ TEST(UnknownViewpoint, PreparedPointsAndFrameStay) {
   view.origin[0] = 500000;
   const PreparedCloud none = prepare(cpu(), view);
   ASSERT_EQ(none.size(), origin.size());
-  EXPECT_EQ(none.options().voxel_size, origin.options().voxel_size);
+  EXPECT_EQ(none.voxel_size(), origin.voxel_size());
   EXPECT_EQ(none.statistics().input_points, points.size());
   EXPECT_EQ(none.origin().x(), 500000);
   const auto a = origin.points(), b = none.points();

@@ -25,8 +25,7 @@ VoxelSizeSuggestion suggest(const std::vector<Points>& clouds) {
 
 std::uint32_t prepared_points(const Points& cloud, float voxel_size) {
   const Context context = Context::cpu(2);
-  return prepare(context, PointCloudView(cloud),
-                 RegistrationOptions::from_voxel_size(voxel_size).prepare)
+  return prepare(context, PointCloudView(cloud), RegistrationOptions{voxel_size})
       .statistics()
       .points;
 }
@@ -86,8 +85,7 @@ TEST(VoxelSize, ExceedsTheGapsBetweenRings) {
   // Of the points on the nearest quarter of the ground, which has rings up to 2 m apart.
   const Context context = Context::cpu(2);
   const auto share = [&](float size) {
-    const PreparedCloud cloud =
-        prepare(context, PointCloudView(few), RegistrationOptions::from_voxel_size(size).prepare);
+    const PreparedCloud cloud = prepare(context, PointCloudView(few), RegistrationOptions{size});
     std::size_t upright = 0, near = 0;
     const auto points = cloud.points(), normals = cloud.normals();
     for (std::size_t k = 0; k < points.size(); ++k) {

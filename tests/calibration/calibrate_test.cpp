@@ -65,7 +65,7 @@ const Scans& scans() {
   return scans;
 }
 
-RegistrationOptions fast() { return RegistrationOptions::from_voxel_size(kVoxel, 2); }
+RegistrationOptions fast() { return RegistrationOptions{kVoxel, 2}; }
 
 CalibrationOptions some_pairs() {
   CalibrationOptions options;
@@ -227,7 +227,7 @@ Row row(const Eigen::Vector3f& p) { return {p.x(), p.y(), p.z()}; }
 
 TEST(Halves, AreDisjointPartsOfTheScanUnderOnePose) {
   const PointCloudView scan = scans().views()[0];
-  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast().prepare);
+  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast());
   std::set<Row> all;
   for (const Eigen::Vector3f& p : scans().clouds[0]) all.insert(row(p));
   for (std::uint32_t number = 0; number < 8; ++number) {
@@ -276,7 +276,7 @@ double overlap_of(const Halves& halves) {
 
 TEST(Halves, OverlapsVary) {
   const PointCloudView scan = scans().views()[0];
-  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast().prepare);
+  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast());
   std::vector<double> overlaps;
   for (std::uint32_t number = 0; number < 40; ++number) {
     const double overlap = overlap_of(halves_of(scan, prepared, 0, 0.4, 1, number));
@@ -294,7 +294,7 @@ TEST(Halves, OverlapsVary) {
 
 TEST(Halves, TheNoiseHasItsSize) {
   const PointCloudView scan = scans().views()[0];
-  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast().prepare);
+  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast());
   const Halves clean = halves_of(scan, prepared, 0, 0.4, 1, 0),
                noisy = halves_of(scan, prepared, 0.01, 0.4, 1, 0);
   ASSERT_EQ(clean.source.points.size(), noisy.source.points.size());
@@ -320,7 +320,7 @@ TEST(Halves, NormalsAndFeaturesFollow) {
   scan.normals = normals.front().data();
   scan.features = features.data();
   scan.feature_dimension = 2;
-  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast().prepare);
+  const PreparedCloud prepared = prepare(Context::cpu(1), scan, fast());
   const Halves halves = halves_of(scan, prepared, 0, 0.4, 1, 0);
   const PointCloudView view = halves.target.view();
   view.validate();

@@ -23,7 +23,7 @@ using confidence::ModeConfidence;
 constexpr float kVoxel = 0.1f;
 
 RegistrationOptions options_with(const ConfidenceCalibration& calibration) {
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(kVoxel);
+  RegistrationOptions options{kVoxel};
   options.calibration = calibration;
   return options;
 }
@@ -37,7 +37,7 @@ struct Scene {
     source_points = test::moved(truth.inverse(), test::scan_room(random));
     const Eigen::Vector3f eye = test::kRoomSensor;
     source_eye = (truth.inverse() * eye.cast<double>()).cast<float>();
-    const PrepareOptions prepare_options = options_with({}).prepare;
+    const RegistrationOptions prepare_options = options_with({});
     source = prepare(context, source_view(), prepare_options);
     target = prepare(context, target_view(), prepare_options);
   }
@@ -110,7 +110,8 @@ TEST(Calibration, AlignViews) {
 
 TEST(Calibration, AlignSwapped) {
   expect_mapped([](RegistrationOptions options) {
-    options.smaller_as_source = scene().source.size() > scene().target.size();
+    const bool larger = scene().source.size() > scene().target.size();
+    options.tune = larger ? "smaller_as_source=true" : "smaller_as_source=false";
     return align(scene().context, scene().source, scene().target, options);
   });
 }

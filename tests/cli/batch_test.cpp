@@ -79,7 +79,7 @@ TEST_F(Batch, VoxelSizeByTheFragments) {
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   expect_holds(outcome.out, {"voxel size 0."});
   const auto json = json_of(out_ / "r.json");
-  EXPECT_NE(json["options"]["prepare"]["voxel_size"], 0.05);
+  EXPECT_NE(json["options"]["voxel_size"], 0.05);
   EXPECT_GE(json["fragments"][0]["points"], 3000);
   EXPECT_LE(json["fragments"][0]["points"], 20000);
   const TemporaryFolder empty;
@@ -186,7 +186,6 @@ TEST_F(Batch, MinimalScoreIsTheThreshold) {
   EXPECT_TRUE(evaluation::read_log(out_ / "none.log").empty());
   const auto options = json_of(out_ / "none.json")["options"];
   EXPECT_EQ(options["min_confidence"], 1.0);
-  EXPECT_FLOAT_EQ(options["quadruples"]["min_inlier_ratio"].get<float>(), 0.3f) << "not asked for";
   // The candidates are the same whatever is reported.
   const auto poses = [&](const char* name) {
     auto pairs = without_times(json_of(out_ / name))["pairs"];
@@ -205,9 +204,7 @@ TEST_F(Batch, MinimalScoreOfLoopsmartIsTheInlierRatio) {
     const std::string name = "ratio" + score;
     batch(name, joined(kLoopsmart, {"--min-score", score}));
     const auto json = json_of(out_ / (name + ".json"));
-    EXPECT_FLOAT_EQ(json["options"]["quadruples"]["min_inlier_ratio"].get<float>(),
-                    std::stof(score));
-    EXPECT_EQ(json["options"]["min_confidence"], 0.5) << "not asked for";
+    EXPECT_EQ(json["options"]["min_confidence"], std::stod(score));
     std::size_t expected = 0;
     for (const auto& pair : json["pairs"]) {
       EXPECT_EQ(pair["score"], pair["inlier_ratio"]);

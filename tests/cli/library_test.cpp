@@ -22,25 +22,25 @@ constexpr int kScans = 4;
 
 RegistrationResult pair(const std::string& source, const std::string& target) {
   const PointCloud a = io::read_point_cloud(source), b = io::read_point_cloud(target);
-  return align(Context::cpu(), a.view(), b.view(), RegistrationOptions::from_voxel_size(0.1f));
+  return align(Context::cpu(), a.view(), b.view(), RegistrationOptions{0.1f});
 }
 
 /// Goes on where an interrupted run stopped.
 RegisterAllReport batch(const ScanFiles& scans, const std::string& journal_file) {
-  const auto options = RegistrationOptions::from_voxel_size(0.1f);
+  const auto options = RegistrationOptions{0.1f};
   PairJournal journal(journal_file, identity_of(scans, options), all_pairs(scans.size()),
                       PairJournal::Mode::resume);
   return register_all({Context::cpu()}, scans, journal, options);
 }
 
 reconstruction::MapOfSet map(const std::string& folder) {
-  const auto options = reconstruction::MapOptions::from_voxel_size(0.1f);
+  const reconstruction::MapOptions options{RegistrationOptions{0.1f}};
   return reconstruct(Context::cpu(), ScanFiles(folder), {}, options);
 }
 
 localization::LocateResult place(const std::string& scan, const std::string& map_file) {
   const PointCloud cloud = io::read_point_cloud(scan), map = io::read_point_cloud(map_file);
-  const auto options = localization::MapOptions::from_voxel_size(0.1f);
+  const auto options = localization::MapOptions{0.1f};
   return locate(Context::cpu(), cloud.view(), prepare_map(map.view(), options));
 }
 

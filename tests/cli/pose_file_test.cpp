@@ -101,13 +101,13 @@ TEST_F(PoseFile, OptionsThatDoNothingWithAGivenPoseAreRefused) {
   };
   const std::vector<std::string> seed = {"--seed", "2"}, quality = {"--quality", "3"},
                                  score = {"--min-score", "0.9"}, near = {"--near", "0,0,0,1"},
-                                 up = {"--up", "0,0,1"}, set = {"--set", "evidence.sample=1024"},
+                                 up = {"--up", "0,0,1"}, set = {"--set", "accept_symmetry=true"},
                                  json = {"--json", out_ / "r.json"};
   refused({"change", scan, scan, "--pose", pose}, {seed, quality, score, near, up, set}, "--pose");
   refused({"locate", scan, "--save-map", out_ / "m.gpureg"},
           {seed, quality, score, near, up, set, json}, "without a scan");
   for (const char* verb : {"locate", "change"})
-    refused({verb, scan, map}, {{"--set", "prepare.normal_radius=0.3"}}, "a saved map is prepared");
+    refused({verb, scan, map}, {{"--set", "prepare.normal_radius=3"}}, "a saved map is prepared");
   refused({"audit", folder_.path(), poses}, {score}, "in an audit");
   refused({"audit", folder_.path(), poses}, {seed, quality}, "without --mend");
   refused({"audit", folder_.path(), poses, "--mend", out_ / "m.txt"}, {score}, "in an audit");

@@ -15,7 +15,7 @@ namespace gpureg::test {
 /// milliseconds.
 inline const std::vector<std::string> kSmall = {"--voxel-size", "0.1", "--backend", "cpu"};
 inline const std::vector<std::string> kLoopsmart = {"--preset", "loopsmart", "--set",
-                                                    "quadruples.count=40000"};
+                                                    "quadruples=40000"};
 
 std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b);
 

@@ -77,14 +77,16 @@ TEST_F(Usage, OtherValues) {
   expect_refused(with({"--seed", "1.5"}), {"--seed", "1.5"});
   expect_refused(with({"--seed", "18446744073709551616"}), {"--seed", "18446744073709551616"});
   const auto hypotheses = [&](const char* count) {
-    return with({"--preset", "loopsmart", "--set", std::string("quadruples.count=") + count});
+    return with({"--preset", "loopsmart", "--set", std::string("quadruples=") + count});
   };
-  expect_refused(hypotheses("0"), {"quadruples.count is 0"});
-  expect_refused(hypotheses("2000000000"), {"quadruples.count is 2000000000"});
-  expect_refused(hypotheses("4e6"), {"--set", "quadruples.count=4e6", "whole number"});
+  expect_refused(hypotheses("0"), {"quadruples is 0"});
+  expect_refused(hypotheses("2000000000"), {"quadruples is 2000000000"});
+  expect_refused(hypotheses("4e6"), {"--set", "quadruples=4e6", "whole number"});
   expect_refused(hypotheses("4294967297"), {"--set", "4294967297"});
-  expect_refused(with({"--set", "evidence.sampel=3"}), {"--set", "sampel", "sample, modes"});
-  expect_refused(with({"--set", "evidence.sample=3"}), {"evidence.sample is 3", "64 to 65536"});
+  expect_refused(with({"--set", "prepare.depth_map=3"}),
+                 {"--set", "depth_map", "did you mean depth_maps?"});
+  expect_refused(with({"--set", "tune=evidence.sample=3"}),
+                 {"tune: evidence.sample is 3", "64 to 65536"});
   expect_refused(with({"--threads", "-1"}), {"--threads", "-1"});
   expect_refused(with({"--threads", "two"}), {"--threads", "two"});
   expect_refused(with({"--preset", "fast"}), {"--preset", "fast", "loopsmart"});
@@ -104,17 +106,15 @@ TEST_F(Usage, ATimeBudgetIsRefusedBeforeTheWork) {
 }
 
 TEST_F(Usage, OptionsThatWouldDoNothing) {
-  expect_refused(with({"--set", "quadruples.count=100"}),
-                 {"--set quadruples.count=100", "method compatibility"});
-  expect_refused(with({"--preset", "loopsmart", "--set", "min_confidence=0.5"}),
-                 {"min_confidence=0.5", "does nothing", "quadruples"});
-  expect_refused(with({"--preset", "loopsmart", "--set", "evidence.sample=64"}),
-                 {"--set evidence.sample=64", "method quadruples"});
+  expect_refused(with({"--set", "quadruples=100"}),
+                 {"--set quadruples=100", "method compatibility"});
+  expect_refused(with({"--preset", "loopsmart", "--set", "accept_symmetry=true"}),
+                 {"accept_symmetry=true", "does nothing", "quadruples"});
   expect_refused(with({"--preset", "loopsmart", "--quality", "3"}),
                  {"--quality", "--preset loopsmart"});
   expect_refused(with({"--time-budget", "10", "--quality", "3"}), {"--time-budget", "--quality"});
-  expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--set", "quadruples.count=1"},
-                 {"--set quadruples.count=1", "method compatibility"});
+  expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--set", "quadruples=1"},
+                 {"--set quadruples=1", "method compatibility"});
 }
 
 TEST_F(Usage, MessagesStayInOneLine) {

@@ -2,6 +2,7 @@
 // Where refinement may stop anywhere along a wall, the most likely pose is perturbed along it, and
 // the evidence tells which pose is correct.
 #include "confidence/degeneracy_search.hpp"
+#include "api/with_settings.hpp"
 
 #include <gtest/gtest.h>
 
@@ -52,7 +53,7 @@ void match(PairOutcome& outcome, const PreparedState& source, const PreparedStat
 }
 
 PosesOfPair perturbed(const PreparedState& source, const PreparedState& target,
-                      const PairOutcome& outcome, const RegistrationOptions& options) {
+                      const PairOutcome& outcome, const RegistrationSettings& options) {
   const PairInput pair{&source, &target, {}, {}, {}};
   return confidence::search_degeneracies({&pair, 1}, {&outcome, 1}, options, 1).at(0);
 }
@@ -65,7 +66,7 @@ TEST(DegeneracySearch, BothWaysAlongTheWall) {
              target = test::prepare_one(exec, test::raw_cloud(b), {});
   PairOutcome outcome = test::verified_in_place(exec, *source, *target);
   match(outcome, *source, *target, 0);
-  RegistrationOptions options;
+  RegistrationSettings options;
   for (const float distance : {0.4f, 0.15f}) {
     options.evidence.degeneracy_search_distance = distance;
     const PosesOfPair found = perturbed(*source, *target, outcome, options);
@@ -99,7 +100,7 @@ TEST(DegeneracySearch, MorePosesWhereTheEvidenceIsOpen) {
   PairOutcome outcome = test::verified_in_place(exec, *cloud, *cloud);
   const auto poses_at = [&](double log_odds) {
     match(outcome, *cloud, *cloud, log_odds);
-    return perturbed(*cloud, *cloud, outcome, RegistrationOptions()).poses.size();
+    return perturbed(*cloud, *cloud, outcome, RegistrationSettings()).poses.size();
   };
   EXPECT_EQ(poses_at(-5.3), 0u);
   EXPECT_EQ(poses_at(-2), 8u);
@@ -122,7 +123,7 @@ TEST(DegeneracySearch, RotatesAboutTheCentreOfTheInliers) {
   const auto cloud = test::prepare_one(exec, test::raw_cloud(ball), {});
   PairOutcome outcome = test::verified_in_place(exec, *cloud, *cloud);
   match(outcome, *cloud, *cloud, 0);
-  RegistrationOptions options;
+  RegistrationSettings options;
   const PosesOfPair found = perturbed(*cloud, *cloud, outcome, options);
   ASSERT_EQ(found.poses.size(), 8u);
   const Vec3 middle{6 - cloud->origin[0], -3 - cloud->origin[1], 1 - cloud->origin[2]};
@@ -149,7 +150,7 @@ TEST(DegeneracySearch, APoseThatComesBackDoesNotCount) {
     source.viewpoints = moved_eye.data();
     target.viewpoints = eye.data();
     source.viewpoint_count = target.viewpoint_count = 1;
-    RegistrationOptions searched, still;
+    RegistrationSettings searched, still;
     still.evidence.degeneracy_search_distance = 0;
     const RegistrationResult a = align(Context::cpu(), source, target, searched),
                              b = align(Context::cpu(), source, target, still);
@@ -170,7 +171,7 @@ TEST(DegeneracySearch, APoseThatStaysAwayIsAnAlternative) {
   const float eye[3] = {0, 0, 0};
   cloud.viewpoints = eye;
   cloud.viewpoint_count = 1;
-  RegistrationOptions searched, still;
+  RegistrationSettings searched, still;
   still.evidence.degeneracy_search_distance = 0;
   const RegistrationResult a = align(Context::cpu(), cloud, cloud, searched),
                            b = align(Context::cpu(), cloud, cloud, still);

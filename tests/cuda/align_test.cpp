@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Alignment on both backends, stage by stage: the same bits after each.
 #include "algorithm/fpfh.hpp"
+#include "api/with_settings.hpp"
 #include "cpu/common/stages.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/gpu.hpp"
@@ -29,7 +30,7 @@ struct PairOfClouds {
 /// Prepares the clouds and aligns the pairs on both backends; every output is compared.
 void expect_same_alignment(const std::vector<RawCloud>& raw,
                            const std::vector<PairOfClouds>& wanted,
-                           const RegistrationOptions& options) {
+                           const RegistrationSettings& options) {
   cpu::Exec on_cpu(2);
   cuda::Exec on_cuda(0);
   on_cuda.begin();
@@ -167,13 +168,13 @@ class AlignOnCuda : public ::testing::Test {
   std::mt19937 random{3};
   std::vector<std::vector<Vec3>> kept;
   std::vector<PairOfClouds> pairs;
-  RegistrationOptions options;
+  RegistrationSettings options;
 };
 
 TEST_F(AlignOnCuda, Default) { expect_same_alignment(raw(), pairs, options); }
 
 TEST_F(AlignOnCuda, Paper) {
-  options = RegistrationOptions::loopsmart();
+  options = resolve(RegistrationOptions::loopsmart());
   options.quadruples.count = 300'000;
   expect_same_alignment(raw(), pairs, options);
 }
@@ -306,7 +307,7 @@ TEST_F(AlignOnCuda, AMapOfManyCandidates) {
   for (const Vec3& p : map)
     if (std::fabs(p.x - 3) < 1.2f && std::fabs(p.y + 2) < 1.2f) piece.push_back(p);
   kept = {map, piece};
-  options = RegistrationOptions::from_voxel_size(0.05f);
+  options = resolve(RegistrationOptions{0.05f});
   options.prepare.voxel_size = 0;
   options.quadruples.count = 50'000;
   cpu::Exec exec(2);

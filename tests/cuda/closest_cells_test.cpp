@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Closest points by the packed lists of the device: the point, its distance and its normal are
 // those of the CPU's closest-point grid, whatever the size of the positions in the near lists.
+#include "api/with_settings.hpp"
 #include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/prepared_cloud.hpp"
 #include "cuda/common/stages.hpp"
@@ -74,7 +75,7 @@ class ClosestCells : public ::testing::Test {
 
   std::mt19937 random{11};
   std::size_t bytes_per_point = 0;
-  PrepareOptions options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  PrepareSettings options = resolve(RegistrationOptions{0.05f}).prepare;
 };
 
 TEST_F(ClosestCells, PositionsOfOneByte) {
@@ -114,7 +115,7 @@ TEST_F(ClosestCells, LongListsOfOneByte) {
 }
 
 TEST_F(ClosestCells, PositionsOfTwoBytesAndLongLists) {
-  options = RegistrationOptions::from_voxel_size(0.03f).prepare;
+  options = resolve(RegistrationOptions{0.03f}).prepare;
   options.max_correspondence_distance = 0.4f;
   const ListCounts counts = expect_same_points(test::bumpy_sheet(random, 100'000, 3.0f));
   EXPECT_GT(counts.bricks[0], 10u);

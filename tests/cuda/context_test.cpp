@@ -7,6 +7,7 @@
 #include <future>
 #include <thread>
 
+#include "api/with_settings.hpp"
 #include "cuda/common/engine.hpp"
 #include "cuda/room_scans.hpp"
 #include "gpureg/error.hpp"
@@ -137,7 +138,7 @@ TEST_F(CudaContext, ThreadsWithTheirOwnContextsAndThreadsThatShareOne) {
 
 // One context needs more shared memory per block than the other: the permission is the device's.
 TEST_F(CudaContext, ContextsOfOneDeviceNeedDifferentSharedMemory) {
-  options = RegistrationOptions::loopsmart(0.05f);
+  options = resolve(RegistrationOptions::loopsmart(0.05f));
   options.quadruples.count = 200000;
   const std::vector<Eigen::Vector3f> few(scans[1].begin(), scans[1].begin() + 300);
   const auto align_many = [&](std::size_t first, int rounds) {

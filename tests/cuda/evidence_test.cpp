@@ -2,6 +2,7 @@
 // Registration by evidence on both backends, stage by stage: the same bits after each.
 #include <thread>
 
+#include "api/with_settings.hpp"
 #include "cpu/common/stages.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/gpu.hpp"
@@ -80,7 +81,7 @@ class EvidenceOnCuda : public ::testing::Test {
   std::vector<std::vector<Vec3>> kept;
   std::vector<Vec3> viewpoints;
   std::vector<PairOfClouds> pairs;
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
+  RegistrationSettings options = resolve(RegistrationOptions{0.05f});
 };
 
 /// Prepares the clouds and aligns the pairs on both backends; every output is compared.
@@ -296,7 +297,7 @@ TEST_F(EvidenceOnCuda, AMapOfManyCandidates) {
     if (std::fabs(p.x - 3) < 1.2f && std::fabs(p.y + 2) < 1.2f) piece.push_back(p);
   keep(std::move(map));
   keep(std::move(piece));
-  options = RegistrationOptions::from_voxel_size(0.05f);
+  options = resolve(RegistrationOptions{0.05f});
   options.prepare.voxel_size = 0;
   pairs = {{1, 0, {}, {}}};
   expect_same();

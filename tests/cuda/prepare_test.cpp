@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "api/with_settings.hpp"
 #include "cpu/common/stages.hpp"
 #include "cuda/common/nearest_feature.hpp"
 #include "cuda/common/stages.hpp"
@@ -26,7 +27,7 @@ std::vector<float> one_nan(std::vector<float> values) {
 }
 
 /// Runs both backends over one batch and compares after every stage.
-void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOptions& options) {
+void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareSettings& options) {
   cpu::Exec on_cpu(2);
   cuda::Exec on_cuda(0);
   on_cuda.begin();
@@ -228,7 +229,7 @@ class PrepareOnCuda : public ::testing::Test {
   std::mt19937 random{7};
   std::vector<std::unique_ptr<std::vector<Vec3>>> kept;
   std::vector<RawCloud> raw;
-  PrepareOptions options;
+  PrepareSettings options;
 };
 
 TEST_F(PrepareOnCuda, RandomSheetsOfManySizes) {
@@ -267,7 +268,7 @@ TEST_F(PrepareOnCuda, OtherRadii) {
   keep(test::bumpy_sheet(random, 60000, 3.0f));
   keep(test::cube(random, 5000, 1.5f));
   for (const float v : {0.03f, 0.1f, 0.7f}) {
-    const auto scaled = RegistrationOptions::from_voxel_size(v).prepare;
+    const auto scaled = resolve(RegistrationOptions{v}).prepare;
     expect_same_preparation(raw, scaled);
   }
   // lists of hundreds of candidates, blocks with thousands of points
@@ -305,7 +306,7 @@ TEST_F(PrepareOnCuda, GivenNormalsViewpointsAndFeatures) {
   few.viewpoints = many.viewpoints = &eye.x;
   few.viewpoint_count = many.viewpoint_count = 1;
   expect_same_preparation({few, with_normals, many, with_views}, options);
-  options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  options = resolve(RegistrationOptions{0.05f}).prepare;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
   options.depth_maps = 64;
   options.wide_feature_radius = options.feature_radius;
@@ -327,7 +328,7 @@ TEST_F(PrepareOnCuda, WideFeaturesAndDepthMaps) {
     raw[c].viewpoints = &viewpoints[0].x;
     raw[c].viewpoint_count = viewpoints.size() - c;
   }
-  options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  options = resolve(RegistrationOptions{0.05f}).prepare;
   for (const std::uint32_t maps : {1u, 3u, 10u}) {
     options.depth_maps = maps;
     expect_same_preparation(raw, options);
@@ -354,7 +355,7 @@ TEST_F(PrepareOnCuda, CrowdedVoxels) {
   for (const std::size_t in_a_voxel : {511u, 512u, 513u, 768u, 50000u})
     keep(crowded(in_a_voxel, 3000));
   keep(std::vector<Vec3>(70000, Vec3{1, 2, 3}));
-  options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  options = resolve(RegistrationOptions{0.05f}).prepare;
   expect_same_preparation(raw, options);
   const std::size_t dimension = 300;
   std::vector<std::vector<Vec3>> normals;
@@ -419,7 +420,7 @@ TEST_F(PrepareOnCuda, RedKitchenFragments) {
     raw.push_back(one);
   }
   expect_same_preparation(raw, options);
-  expect_same_preparation(raw, RegistrationOptions::from_voxel_size(0.05f).prepare);
+  expect_same_preparation(raw, resolve(RegistrationOptions{0.05f}).prepare);
 }
 
 TEST_F(PrepareOnCuda, FgrRangePairs) {

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "api/with_settings.hpp"
 #include "cuda/gpu.hpp"
 #include "gpureg/registration.hpp"
 #include "gpureg/verification.hpp"
@@ -52,7 +53,7 @@ TEST(RedKitchenOnCuda, AllPairsAreTheCpus) {
   for (const PointCloud& cloud : raw) views.push_back(cloud.view());
   const std::vector<Pair> pairs = all_pairs(raw.size());
   ASSERT_EQ(pairs.size(), 190u);
-  RegistrationOptions options = RegistrationOptions::loopsmart();
+  RegistrationSettings options = resolve(RegistrationOptions::loopsmart());
   const Context cpu = Context::cpu(), cuda = Context::cuda();
   const auto on_cpu = prepare_batch(cpu, views, options.prepare),
              on_cuda = prepare_batch(cuda, views, options.prepare);
@@ -93,7 +94,7 @@ TEST(RedKitchenOnCuda, AllPairsByEvidenceAreTheCpus) {
   for (const PointCloud& cloud : raw) views.push_back(cloud.view());
   const std::vector<Pair> pairs = all_pairs(raw.size());
   ASSERT_EQ(pairs.size(), 190u);
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
+  RegistrationSettings options = resolve(RegistrationOptions{0.05f});
   const Context cpu = Context::cpu(), cuda = Context::cuda();
   const auto on_cpu = prepare_batch(cpu, views, options.prepare),
              on_cuda = prepare_batch(cuda, views, options.prepare);

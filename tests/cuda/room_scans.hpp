@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "api/with_settings.hpp"
 #include "cuda/gpu.hpp"
 #include "gpureg/registration.hpp"
 #include "support/result_bytes.hpp"
@@ -19,7 +20,7 @@ inline Results all_bytes(const std::vector<RegistrationResult>& results) {
 /// Six scans of a room and an empty cloud, and every pair of them.
 class RoomScans : public ::testing::Test {
  protected:
-  RoomScans() : options(RegistrationOptions::from_voxel_size(0.08f)) {
+  RoomScans() : options(resolve(RegistrationOptions{0.08f})) {
     options.quadruples.count = 20000;
     std::mt19937 random(1);
     for (int k = 0; k < 6; ++k) scans.push_back(moved(random_pose(random), scan_room(random)));
@@ -33,7 +34,7 @@ class RoomScans : public ::testing::Test {
     return all_bytes(
         align_batch(context, prepare_batch(context, views, options.prepare), list, options));
   }
-  RegistrationOptions options;
+  RegistrationSettings options;
   std::vector<std::vector<Eigen::Vector3f>> scans;
   std::vector<PointCloudView> views;
   std::vector<Pair> pairs;

@@ -19,7 +19,7 @@ TEST(ScaleOnCuda, HasTheSameBits) {
   const auto target = test::scan_room(random);
   auto source = test::moved(test::random_pose(random), test::scan_room(random));
   for (Eigen::Vector3f& p : source) p *= 0.4f;
-  const RegistrationOptions options = RegistrationOptions::from_voxel_size(0.08f);
+  const RegistrationOptions options{0.08f};
   const PointCloudView a(source), b(target);
   const ScaledResult cpu = align_scaled(Context::cpu(2), a, b, {}, options),
                      cuda = align_scaled(Context::cuda(), a, b, {}, options);

@@ -9,6 +9,7 @@
 #include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
 #include "fields/statistics.hpp"
+#include "settings/fields.hpp"
 #include "support/member_count.hpp"
 
 namespace gpureg {
@@ -79,10 +80,6 @@ TEST(Fields, EveryMemberIsDescribed) {
   expect_complete<PrepareStatistics>();
   expect_complete<ConfidenceCalibration>();
   expect_complete<PrepareOptions>();
-  expect_complete<QuadrupleOptions>();
-  expect_complete<RefineOptions>();
-  expect_complete<CompatibilityOptions>();
-  expect_complete<EvidenceOptions>();
   expect_complete<RegistrationOptions>();
   expect_complete<LoopConsistencyOptions>();
   expect_complete<PairConsistency>();
@@ -102,6 +99,12 @@ TEST(Fields, EveryMemberIsDescribed) {
   expect_complete<localization::MapOptions>();
   expect_complete<localization::LocateOptions>();
   expect_complete<localization::ChangeOptions>();
+  expect_complete<PrepareSettings>();
+  expect_complete<QuadrupleSettings>();
+  expect_complete<RefineSettings>();
+  expect_complete<CompatibilitySettings>();
+  expect_complete<EvidenceSettings>();
+  expect_complete<RegistrationSettings>();
 }
 
 }  // namespace

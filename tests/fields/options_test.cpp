@@ -6,10 +6,14 @@
 #include <cstring>
 #include <limits>
 
+#include "fields/in_units.hpp"
 #include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
-#include "fields/scale.hpp"
 #include "gpureg/error.hpp"
+#include "loop_closure/options.hpp"
+#include "reconstruction/audit/in_units.hpp"
+#include "settings/fields.hpp"
+#include "settings/resolve.hpp"
 #include "support/expect_error.hpp"
 
 namespace gpureg {
@@ -28,28 +32,19 @@ std::string message(Change&& change) {
 }
 
 TEST(OptionFields, MessagesNameFieldValueAndRange) {
-  EXPECT_EQ(message([](auto& o) { o.prepare.voxel_size = -1; }),
-            "prepare.voxel_size is -1, expected 0 or a length in [1e-6, 1e6]");
+  EXPECT_EQ(message([](auto& o) { o.voxel_size = -1; }),
+            "voxel_size is -1, expected a length in [1e-6, 1e6]");
   EXPECT_EQ(message([](auto& o) { o.prepare.normal_radius = 0; }),
-            "prepare.normal_radius is 0, expected a length in [1e-6, 1e6]");
+            "prepare.normal_radius is 0, expected a number of voxels in [0.001, 1000]");
   EXPECT_EQ(message([](auto& o) { o.prepare.depth_maps = 65; }),
             "prepare.depth_maps is 65, expected at most 64");
-  EXPECT_EQ(message([](auto& o) { o.prepare.wide_feature_radius = 2; }),
-            "prepare.wide_feature_radius is 2, expected at most 4 times prepare.feature_radius");
-  EXPECT_EQ(message([](auto& o) { o.quadruples.count = 0; }),
-            "quadruples.count is 0, expected 1 to 2^30");
-  EXPECT_EQ(message([](auto& o) { o.quadruples.neighbors = 17; }),
-            "quadruples.neighbors is 17, expected 1 to 16");
-  EXPECT_EQ(message([](auto& o) { o.quadruples.edge_similarity = 0; }),
-            "quadruples.edge_similarity is 0, expected a ratio in (0, 1]");
-  EXPECT_EQ(message([](auto& o) { o.quadruples.min_inlier_ratio = 1.5f; }),
-            "quadruples.min_inlier_ratio is 1.5, expected a ratio in [0, 1]");
-  EXPECT_EQ(message([](auto& o) { o.compatibility.max_turn = 0; }),
-            "compatibility.max_turn is 0, expected a difference of cosines in (0, 2]");
-  EXPECT_EQ(message([](auto& o) { o.refine.max_iterations = 1001; }),
-            "refine.max_iterations is 1001, expected at most 1000");
-  EXPECT_EQ(message([](auto& o) { o.evidence.mode_angle = 181; }),
-            "evidence.mode_angle is 181, expected degrees in (0, 180]");
+  EXPECT_EQ(message([](auto& o) { o.prepare.wide_feature_radius = 50; }),
+            "prepare.wide_feature_radius is 50, expected at most 4 times prepare.feature_radius");
+  EXPECT_EQ(message([](auto& o) { o.quadruples = 0; }), "quadruples is 0, expected 1 to 2^30");
+  EXPECT_EQ(message([](auto& o) { o.refine_iterations = 1001; }),
+            "refine_iterations is 1001, expected at most 1000");
+  EXPECT_EQ(message([](auto& o) { o.tune = "evidence.mode_angle=181"; }),
+            "tune: evidence.mode_angle is 181, expected degrees in (0, 180]");
   EXPECT_EQ(message([](auto& o) { o.min_confidence = 2; }),
             "min_confidence is 2, expected a probability in [0, 1]");
   EXPECT_EQ(message([](auto& o) { o.calibration.slope = 0; }),
@@ -96,11 +91,13 @@ void expect_bounds() {
 TEST(OptionFields, BoundsAreThoseOfTheRanges) {
   expect_bounds<ConfidenceCalibration>();
   expect_bounds<PrepareOptions>();
-  expect_bounds<QuadrupleOptions>();
-  expect_bounds<RefineOptions>();
-  expect_bounds<CompatibilityOptions>();
-  expect_bounds<EvidenceOptions>();
   expect_bounds<RegistrationOptions>();
+  expect_bounds<PrepareSettings>();
+  expect_bounds<QuadrupleSettings>();
+  expect_bounds<RefineSettings>();
+  expect_bounds<CompatibilitySettings>();
+  expect_bounds<EvidenceSettings>();
+  expect_bounds<RegistrationSettings>();
   expect_bounds<LoopConsistencyOptions>();
   expect_bounds<pose_graph::DriftOptions>();
   expect_bounds<pose_graph::LoopNoiseOptions>();
@@ -141,8 +138,8 @@ TEST(OptionFields, MessagesOfMaps) {
 bool same_bits(float a, float b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 TEST(OptionFields, LengthsHaveTheBitsOfTheirFormulas) {
-  for (const float v : {0.05f, 0.1f, 0.0123f, 7.0f, 1e-6f, 333.3f}) {
-    const RegistrationOptions o = RegistrationOptions::from_voxel_size(v);
+  for (const float v : {0.05f, 0.1f, 0.0123f, 7.0f, 2e-6f, 333.3f}) {
+    const RegistrationSettings o = resolve(RegistrationOptions{v});
     EXPECT_TRUE(same_bits(o.prepare.voxel_size, v));
     EXPECT_TRUE(same_bits(o.prepare.normal_radius, 2.0f * v));
     EXPECT_TRUE(same_bits(o.prepare.feature_radius, 5.0f * v));
@@ -160,36 +157,24 @@ TEST(OptionFields, LengthsHaveTheBitsOfTheirFormulas) {
   }
 }
 
-TEST(OptionFields, MultiplyingLengthsLeavesTheRest) {
-  RegistrationOptions o = RegistrationOptions::from_voxel_size(0.05f);
-  o.evidence.mode_angle = 7;
-  fields::multiply_lengths(o, 2);
-  const RegistrationOptions wide = RegistrationOptions::from_voxel_size(0.1f);
-  EXPECT_FLOAT_EQ(o.prepare.voxel_size, wide.prepare.voxel_size);
-  EXPECT_FLOAT_EQ(o.prepare.feature_radius, wide.prepare.feature_radius);
-  EXPECT_FLOAT_EQ(o.evidence.min_range, wide.evidence.min_range);
-  EXPECT_EQ(o.evidence.mode_angle, 7);
-  EXPECT_EQ(o.evidence.sample, wide.evidence.sample);
-}
-
 TEST(OptionFields, LengthsOfMapsHaveTheBitsOfTheirFormulas) {
   for (const float v : {0.05f, 0.1f, 0.0123f, 7.0f}) {
     const double scale = static_cast<double>(v) / 0.05;
-    const auto r = reconstruction::Options::from_voxel_size(v);
-    EXPECT_TRUE(same_bits(r.consistency.closing_distance, 3.0f * v));
+    const LoopConsistencyOptions l = fields::in_units(LoopConsistencyOptions{v}, v);
+    EXPECT_TRUE(same_bits(l.closing_distance, 3.0f * v));
+    const auto r = fields::in_units(reconstruction::Options{v}, v);
     EXPECT_EQ(r.noise.translation, 0.03 * scale);
     EXPECT_EQ(r.noise.max_translation, 0.4 * scale);
     EXPECT_EQ(r.information_unit, 1.0 * scale);
     EXPECT_EQ(r.drift.min_translation, 0.01);
-    const auto f = reconstruction::RefineOptions::for_depth_cameras(v);
+    const auto f = fields::in_units(reconstruction::RefineOptions{v}, v);
     EXPECT_EQ(f.initial_distance, 0.15 * scale);
     EXPECT_EQ(f.final_distance, 0.05 * scale);
     EXPECT_EQ(f.kernel_width, 0.02 * scale);
     EXPECT_EQ(f.point_noise, 0.01 * scale);
     EXPECT_EQ(f.max_edge_error, 0.2 * scale);
-    EXPECT_EQ(f.noise_range, static_cast<double>(30 * v));
-    const auto c = loop_closure::Options::from_voxel_size(v);
-    EXPECT_TRUE(same_bits(c.registration.prepare.feature_radius, 5.0f * v));
+    const auto c = loop_closure::in_units(loop_closure::Options{RegistrationOptions{v}});
+    EXPECT_EQ(c.registration.prepare.feature_radius, 5) << "options of pairs stay in voxels";
     EXPECT_EQ(c.proposals.coarse_voxel_size, 0.5 * scale);
     EXPECT_EQ(c.proposals.max_dilation, 3 * scale);
     EXPECT_EQ(c.proposals.min_uncertainty, 0.03 * scale);
@@ -197,8 +182,14 @@ TEST(OptionFields, LengthsOfMapsHaveTheBitsOfTheirFormulas) {
     EXPECT_EQ(c.noise.max_translation, 0.4 * scale);
     EXPECT_EQ(c.information_unit, scale);
     EXPECT_EQ(c.graph.loop_noise.translation, 0.05 * scale);
+    EXPECT_EQ(c.graph.drift.min_translation, 0.01);
     EXPECT_EQ(c.drift_correlation, 10 * scale);
   }
+}
+
+TEST(OptionFields, ShiftsOfAnAuditGrowMoreSlowlyThanVoxelsBeyondFiveCentimetres) {
+  EXPECT_NEAR(reconstruction::in_units({}, 0.025f).max_shift, 0.075, 1e-8);
+  EXPECT_NEAR(reconstruction::in_units({}, 0.8f).max_shift, 0.15 * 2, 1e-8);
 }
 
 /// Compares every field of two values of one struct.
@@ -214,10 +205,26 @@ struct SameFields {
 
 /// The defaults are those of 5 cm: no length differs in a bit.
 TEST(OptionFields, DefaultsAreThoseOfFiveCentimetres) {
-  const PrepareOptions a, b = RegistrationOptions::from_voxel_size(0.05f).prepare;
-  const EvidenceOptions c, d = RegistrationOptions::from_voxel_size(0.05f).evidence;
-  fields::Fields<PrepareOptions>::visit(SameFields<PrepareOptions>{a, b});
-  fields::Fields<EvidenceOptions>::visit(SameFields<EvidenceOptions>{c, d});
+  const RegistrationSettings a, b = resolve(RegistrationOptions{});
+  fields::Fields<PrepareSettings>::visit(SameFields<PrepareSettings>{a.prepare, b.prepare});
+  fields::Fields<CompatibilitySettings>::visit(
+      SameFields<CompatibilitySettings>{a.compatibility, b.compatibility});
+  fields::Fields<RefineSettings>::visit(SameFields<RefineSettings>{a.refine, b.refine});
+  fields::Fields<EvidenceSettings>::visit(SameFields<EvidenceSettings>{a.evidence, b.evidence});
+}
+
+/// Lengths in voxels that became lengths of maps had these values for voxels of 5 cm.
+TEST(OptionFields, NumbersOfVoxelsHaveTheBitsOfTheirLengths) {
+  for (const auto& [voxels, length] : {std::pair{400.0, 20.0},
+                                       {80, 4},
+                                       {10, 0.5},
+                                       {1, 0.05},
+                                       {0.1, 0.005},
+                                       {2, 0.1},
+                                       {0.6, 0.03},
+                                       {3, 0.15}})
+    for (const float v : {0.05f, 0.1f, 0.0123f})
+      EXPECT_EQ(fields::length_of(voxels, v), length * (static_cast<double>(v) / 0.05));
 }
 
 }  // namespace

@@ -12,17 +12,17 @@ namespace {
 TEST(SetOption, EachTypeIsRead) {
   RegistrationOptions o;
   for (const char* text :
-       {"evidence.sample=1024", "prepare.voxel_size=0.125", "quadruples.mutual=true",
-        "method=quadruples", "seed=18446744073709551615", "calibration.offset=-1e-3"})
+       {"prepare.depth_maps=4", "voxel_size=0.125", "prepare.downsample=false", "method=quadruples",
+        "seed=18446744073709551615", "calibration.offset=-1e-3", "tune=evidence.sample=1024"})
     set_option(o, text);
-  EXPECT_EQ(o.evidence.sample, 1024u);
-  EXPECT_EQ(o.prepare.voxel_size, 0.125f);
-  EXPECT_TRUE(o.quadruples.mutual);
+  EXPECT_EQ(o.prepare.depth_maps, 4u);
+  EXPECT_EQ(o.voxel_size, 0.125f);
+  EXPECT_FALSE(o.prepare.downsample);
   EXPECT_EQ(o.method, RegistrationMethod::quadruples);
   EXPECT_EQ(o.seed, 18446744073709551615u);
   EXPECT_EQ(o.calibration.offset, -1e-3);
+  EXPECT_EQ(o.tune, "evidence.sample=1024");
   const RegistrationOptions untouched;
-  EXPECT_EQ(o.evidence.modes, untouched.evidence.modes);
   EXPECT_EQ(o.prepare.normal_radius, untouched.prepare.normal_radius);
 }
 
@@ -32,17 +32,18 @@ TEST(SetOption, WhatDoesNotFitIsNamed) {
     test::expect_error<InvalidArgument>([&] { set_option(o, text); },
                                         {std::string("--set ") + text + ": " + why});
   };
-  refuse("evidence.sample", "expected NAME=VALUE");
-  refuse("evidence.sampel=3", "there is no such option (did you mean sample?), only sample, modes");
-  refuse("evidence=3", "there is no such option, only sample, modes");
-  refuse("seed.x=3", "there is no such option (did you mean seed?), only seed, min_confidence");
+  refuse("prepare.depth_maps", "expected NAME=VALUE");
+  refuse("prepare.depth_map=3",
+         "there is no such option (did you mean depth_maps?), only downsample, normal_radius");
+  refuse("prepare=3", "there is no such option, only downsample, normal_radius");
+  refuse("seed.x=3", "there is no such option (did you mean seed?), only voxel_size, quality");
   refuse("=3", "there is no such option");
-  refuse("evidence.sample=-1", "expected a whole number from 0 to 4294967295");
-  refuse("evidence.sample=4294967296", "expected a whole number from 0 to 4294967295");
-  refuse("evidence.sample=", "expected a whole number");
-  refuse("prepare.voxel_size=5cm", "expected a number");
-  refuse("prepare.voxel_size=", "expected a number");
-  refuse("quadruples.mutual=1", "expected true or false");
+  refuse("prepare.depth_maps=-1", "expected a whole number from 0 to 4294967295");
+  refuse("prepare.depth_maps=4294967296", "expected a whole number from 0 to 4294967295");
+  refuse("prepare.depth_maps=", "expected a whole number");
+  refuse("voxel_size=5cm", "expected a number");
+  refuse("voxel_size=", "expected a number");
+  refuse("prepare.downsample=1", "expected true or false");
   refuse("method=luck", "expected compatibility or quadruples");
 }
 

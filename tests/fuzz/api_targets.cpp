@@ -72,8 +72,8 @@ void run_verify(std::string_view input) {
     prior.pose = PosePrior{poses[0], static_cast<double>(bytes.number(200)),
                            static_cast<double>(bytes.number(4))};
   try {
-    const PreparedCloud source = prepare(context, a.view(), options.prepare),
-                        target = prepare(context, b.view(), options.prepare);
+    const PreparedCloud source = prepare(context, a.view(), options),
+                        target = prepare(context, b.view(), options);
     for (const PoseVerification& v :
          verify_poses(context, source, target, poses, options, verification))
       if (!(v.confidence >= 0 && v.confidence <= 1)) broken("a confidence is a probability");

@@ -125,9 +125,9 @@ void go_on_from_saved_state(std::string_view bytes) {
     if (id == unused) ++unused;
   }
   loop_closure::Options options;
-  state.voxel_size = options.registration.prepare.voxel_size;
+  state.voxel_size = options.registration.voxel_size;
   std::ofstream(path, std::ios::binary) << loop_closure::to_bytes(state);
-  options.registration = options.registration.with_quality(0);
+  options.registration.quality = 0;
   options.graph.threads = 1;
   loop_closure::LoopCloser closer(context, options);
   closer.load(path, [](loop_closure::FragmentId) { return cloud; });

@@ -54,9 +54,9 @@ void vary(Bytes& bytes, T& options) {
 }
 
 inline RegistrationOptions options_of(Bytes& bytes) {
-  RegistrationOptions o = bytes.flag() ? RegistrationOptions::loopsmart(0.1f)
-                                       : RegistrationOptions::from_voxel_size(0.1f);
-  o.quadruples.count = 256;
+  RegistrationOptions o =
+      bytes.flag() ? RegistrationOptions::loopsmart(0.1f) : RegistrationOptions{0.1f};
+  o.quadruples = 256;
   o.seed = bytes.take<std::uint8_t>();
   vary(bytes, o);
   return o;

@@ -39,9 +39,9 @@ bool is_rigid(const UnalignedIsometry3d& pose) {
 }
 
 PreparedMap map_of(Bytes& bytes) {
-  MapOptions options = MapOptions::from_voxel_size(kVoxel);
+  MapOptions options{kVoxel};
   vary(bytes, options);
-  options.prepare.voxel_size = kVoxel;
+  options.voxel_size = kVoxel;
   MapBuilder builder(options);
   for (std::uint32_t k = 1 + bytes.below(2); k > 0; --k) {
     const PointCloud cloud = cloud_of(bytes);
@@ -93,7 +93,7 @@ void run_locate(std::string_view input) {
   try {
     const PreparedMap map = map_of(bytes);
     const PointCloud scan = cloud_of(bytes);
-    LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+    LocateOptions options = LocateOptions{RegistrationOptions{kVoxel}};
     vary(bytes, options);
     options.registration.prepare = map.options().prepare;
     const std::vector<LocatePrior> priors{prior_of(bytes)};
@@ -113,7 +113,7 @@ void run_change(std::string_view input) {
   try {
     const PreparedMap map = map_of(bytes);
     const PointCloud scan = cloud_of(bytes);
-    ChangeOptions options = ChangeOptions::from_voxel_size(kVoxel);
+    ChangeOptions options;
     vary(bytes, options);
     UnalignedIsometry3d pose = pose_of(bytes, 3);
     if (bytes.below(8) == 0)
@@ -158,7 +158,7 @@ void read_saved_map(std::string_view payload) {
   // What uses it takes a hundred times as long: for some inputs, always the same.
   if (sum % 8 != 0) return;
   try {
-    LocateOptions options = LocateOptions::from_voxel_size(map.options().prepare.voxel_size, 0);
+    LocateOptions options = LocateOptions{RegistrationOptions{map.options().voxel_size, 0}};
     options.max_matches = 256;
     check_places(locate(one(), {cloud.view()}, map, options).front());
     const ChangeResult changes =
@@ -184,15 +184,15 @@ void check_audit(const reconstruction::Audit& audit) {
 void run_audit(std::string_view input) {
   using namespace reconstruction;
   Bytes bytes(input);
-  RegistrationOptions registration = RegistrationOptions::from_voxel_size(0.1f, 1);
-  AuditOptions options = AuditOptions::from_voxel_size(0.1f);
+  RegistrationOptions registration{0.1f, 1};
+  AuditOptions options;
   vary(bytes, options);
   std::vector<PreparedCloud> clouds;
   std::vector<UnalignedIsometry3d> poses;
   const std::uint32_t size = bytes.below(5);
   try {
     for (std::uint32_t k = 0; k < size; ++k) {
-      clouds.push_back(prepare(one(), cloud_of(bytes).view(), registration.prepare));
+      clouds.push_back(prepare(one(), cloud_of(bytes).view(), registration));
       poses.push_back(bytes.below(8) == 0 ? no_pose() : pose_of(bytes, bytes.flag() ? 0.1f : 5.0f));
     }
     check_audit(audit(one(), clouds, poses, registration, options));
@@ -213,8 +213,8 @@ void run_audit(std::string_view input) {
       }
       results.push_back(result);
     }
-    const AuditedReconstruction map = reconstruct(
-        one(), clouds, pairs, results, Options::from_voxel_size(0.1f), {}, registration, options);
+    const AuditedReconstruction map =
+        reconstruct(one(), clouds, pairs, results, Options{0.1f}, {}, registration, options);
     check_audit(map.audit);
     for (const Scan& scan : map.map.scans)
       if (scan.placed && !is_rigid(scan.island_from_scan)) broken("a pose is a rigid motion");

@@ -27,12 +27,12 @@ SCENE = ["--fragments", 14, "--frames-per-fragment", 12, "--seed", 7]
 VOXEL = 0.1
 RUNS = {
     "default": ["--preset", "default"],
-    "loopsmart": ["--preset", "loopsmart", "--set", "quadruples.count=400000"],
+    "loopsmart": ["--preset", "loopsmart", "--set", "quadruples=400000"],
 }
 # Coarse and with little to try: valgrind is some fifty times slower than the processor.
 COUNTED = {
     "default": ["--preset", "default", "--quality", 0],
-    "loopsmart": ["--preset", "loopsmart", "--set", "quadruples.count=40000"],
+    "loopsmart": ["--preset", "loopsmart", "--set", "quadruples=40000"],
 }
 COUNTED_PAIR, COUNTED_VOXEL = (0, 2), 0.2
 PAIRS, MORE_INSTRUCTIONS = 1, 0.05

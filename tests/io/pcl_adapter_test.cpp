@@ -31,8 +31,8 @@ typename pcl::PointCloud<Point>::Ptr scan(
 }
 
 RegistrationOptions quick_options() {
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
-  options.quadruples.count = 200'000;
+  RegistrationOptions options{0.05f};
+  options.quadruples = 200'000;
   return options;
 }
 
@@ -141,17 +141,17 @@ TEST(PclAdapterUse, OptionsAreCheckedAndTakeEffect) {
   std::mt19937 random(7);
   PclRegistration<pcl::PointXYZ> adapter(quick_options(), Context::cpu(2));
   RegistrationOptions options = quick_options();
-  options.quadruples.min_inlier_ratio = 2;
+  options.min_confidence = 2;
   test::expect_error<InvalidArgument>([&] { adapter.setOptions(options); },
-                                      {"min_inlier_ratio", "2"});
+                                      {"min_confidence", "2"});
   adapter.setInputTarget(scan<pcl::PointXYZ>(random));
   adapter.setInputSource(scan<pcl::PointXYZ>(random));
   pcl::PointCloud<pcl::PointXYZ> moved;
   adapter.align(moved);
   EXPECT_TRUE(adapter.hasConverged());
   const auto points = adapter.result().statistics.target_points;
-  options = RegistrationOptions::from_voxel_size(0.1f);
-  options.quadruples.count = 100'000;
+  options = RegistrationOptions{0.1f};
+  options.quadruples = 100'000;
   adapter.setOptions(options);
   adapter.align(moved);
   EXPECT_LT(adapter.result().statistics.target_points, points)

@@ -75,10 +75,11 @@ inline PointCloud seen_room(unsigned number, unsigned sample, const Eigen::Isome
   return cloud;
 }
 
+/// tile_size: metres.
 inline MapOptions map_options(double tile_size = 20) {
-  MapOptions options = MapOptions::from_voxel_size(kVoxel);
-  options.tile_size = tile_size;
-  options.halo = 3;
+  MapOptions options{kVoxel};
+  options.tile_size = tile_size / static_cast<double>(kVoxel);
+  options.halo = 3 / static_cast<double>(kVoxel);
   return options;
 }
 

@@ -79,7 +79,7 @@ const Context& context() {
 }
 
 PreparedMap map_of(const Room& room) {
-  MapBuilder builder(MapOptions::from_voxel_size(0.05f));
+  MapBuilder builder(MapOptions{0.05f});
   builder.add_scan(context(), room.seen_from(kMapSensor).view(), UnalignedIsometry3d::Identity());
   return builder.build();
 }

@@ -79,7 +79,7 @@ TEST(Locate, FindsAScanAmongTiles) {
 TEST(Locate, MoreConfidenceThanUsualTakesTheWholeSearch) {
   const PreparedMap map = building({1, 2, 3}, map_options());
   const Query query(2, 1, 1);
-  LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+  LocateOptions options = LocateOptions{RegistrationOptions{kVoxel}};
   const LocateResult usual = locate(context(), {query.scan.view()}, map, options).front();
   EXPECT_EQ(usual.status, LocateStatus::found);
   EXPECT_EQ(usual.tiles, 0u);
@@ -95,7 +95,7 @@ TEST(Locate, FindsTheSamePlaceInVoxelsOfAnyWidth) {
   const PreparedMap map = building({1, 2, 3}, map_options(5));
   const Query query(2, 1, 1);
   for (const double factor : {1.0, 1.5, 2.0}) {
-    LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+    LocateOptions options = LocateOptions{RegistrationOptions{kVoxel}};
     options.coarse_factor = factor;
     const LocateResult result = locate(context(), {query.scan.view()}, map, options).front();
     ASSERT_EQ(result.status, LocateStatus::found) << factor;
@@ -137,7 +137,7 @@ TEST(Locate, GravityThatContradictsLeavesNothing) {
 TEST(Locate, SameBitsForOtherScansThreadsAndACopyFromAFile) {
   const PreparedMap map = building({1, 2, 3}, map_options(5));
   const Query a(2, 1, 1), b(3, 2, 2), foreign(50, 0, 3);
-  const LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+  const LocateOptions options = LocateOptions{RegistrationOptions{kVoxel}};
   const std::vector<LocateResult> together =
       locate(Context::cpu(1), {a.scan.view(), foreign.scan.view(), b.scan.view()}, map, options);
   ASSERT_EQ(together.size(), 3u);

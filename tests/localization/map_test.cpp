@@ -25,7 +25,7 @@ TEST_F(SavedMap, LoadedIsEqual) {
   EXPECT_EQ(loaded.size(), map.size());
   EXPECT_EQ(loaded.tiles(), map.tiles());
   EXPECT_EQ(loaded.options().tile_size, map.options().tile_size);
-  EXPECT_EQ(loaded.options().prepare.voxel_size, map.options().prepare.voxel_size);
+  EXPECT_EQ(loaded.options().voxel_size, map.options().voxel_size);
   const PointCloud before = map.cloud(), after = loaded.cloud();
   EXPECT_EQ(before.points, after.points);
   EXPECT_EQ(before.normals, after.normals);
@@ -73,8 +73,8 @@ TEST_F(SavedMap, OtherFilesAreNamed) {
     refused(good.substr(0, size), "truncated");
   refused(good + "x", "longer");
   std::string later = good;
-  later[8] = 4;
-  refused(later, "version 4");
+  later[8] = 5;
+  refused(later, "version 5");
   for (std::size_t at = 28; at < good.size(); at += good.size() / 20) {
     std::string flipped = good;
     flipped[at] = static_cast<char>(flipped[at] ^ 0x10);

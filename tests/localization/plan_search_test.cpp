@@ -157,8 +157,9 @@ TEST(VerifyPlanned, RefinesFromOtherHeights) {
     candidate.map_from_scan.translation() += voxels * static_cast<double>(kVoxel) * up;
     candidate.confidence = 0.5;
     scan.candidates = {candidate};
-    const auto places =
-        verify_planned(context(), state, LocateOptions::from_voxel_size(kVoxel), 0, {&scan});
+    const auto places = verify_planned(
+        context(), state, localization::resolve(LocateOptions{RegistrationOptions{kVoxel}}), 0,
+        {&scan});
     ASSERT_EQ(places.at(0).size(), 1u);
     LocatedPose pose;
     pose.map_from_scan = places[0][0].verification.target_from_source;

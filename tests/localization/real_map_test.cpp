@@ -31,7 +31,7 @@ TEST(RealMap, LeftOutFragmentsOfTheRedKitchenAreFoundAndAHouseIsNot) {
   GPUREG_DATA_FOLDER_OR_SKIP(house, "house/A");
   const Context context = Context::cpu(2);
   const std::vector<int> left_out{2, 12};
-  MapBuilder builder(MapOptions::from_voxel_size(0.05f));
+  MapBuilder builder(MapOptions{0.05f});
   std::map<int, Eigen::Matrix4d> poses;
   for (const auto& pose : evaluation::read_trajectory(kitchen + "/poses.txt"))
     poses[static_cast<int>(pose.time)] = pose.world_from_body;

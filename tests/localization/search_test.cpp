@@ -22,15 +22,16 @@ const Context& context() {
 class LargeMap : public testing::Test {
  protected:
   LargeMap() {
-    options_.coarse_factor = 1;
-    options_.coarse_tiles = 2;
+    given_.coarse_factor = 1;
+    given_.coarse_tiles = 2;
+    options_ = localization::resolve(given_);
   }
 
   Scan scan_in_voxels(double coarsest) const {
-    const auto prepared = [&](const PrepareOptions& options) {
+    const auto prepared = [&](const PrepareSettings& options) {
       return prepare_batch(context(), {query_.scan.view()}, options).front();
     };
-    Scan scan = localization::scan_of(prepared(map_.options().prepare), {});
+    Scan scan = localization::scan_of(prepared(state_.options.prepare), {});
     scan.coarse = scan.cloud;
     scan.coarsest = prepared(localization::prepare_for(state_, coarsest));
     return scan;
@@ -42,7 +43,8 @@ class LargeMap : public testing::Test {
 
   PreparedMap map_ = building({1, 2, 3, 4, 5, 6}, map_options(4));
   const MapState& state_ = MapState::of(map_);
-  LocateOptions options_ = LocateOptions::from_voxel_size(kVoxel);
+  LocateOptions given_{RegistrationOptions{kVoxel}};
+  localization::LocateSettings options_;
   Query query_{5, 4, 3};
 };
 
@@ -90,12 +92,12 @@ TEST_F(LargeMap, FindsTheScanWithTheSameBitsForOtherScansAndThreads) {
   const Query other(2, 1, 1), foreign(50, 0, 3);
   const auto together =
       locate(Context::cpu(1), {foreign.scan.view(), query_.scan.view(), other.scan.view()}, map_,
-             options_);
+             given_);
   EXPECT_EQ(together[0].status, LocateStatus::not_found);
   ASSERT_EQ(together[1].status, LocateStatus::found);
   EXPECT_LT(query_.error(together[1].poses.front()), 0.05);
   const LocateResult alone = locate(Context::cpu(3), {query_.scan.view()},
-                                    building({1, 2, 3, 4, 5, 6}, map_options(4)), options_)
+                                    building({1, 2, 3, 4, 5, 6}, map_options(4)), given_)
                                  .front();
   EXPECT_EQ(numbers_of(alone), numbers_of(together[1]));
 }

@@ -79,7 +79,7 @@ TEST_F(StrayPointsOfPlaces, OfMapAndScanThatAreCompared) {
 }
 
 TEST_F(StrayPointsOfPlaces, OfASurfaceThatIsRefined) {
-  const PrepareOptions prepare = options.prepare;
+  const RegistrationOptions prepare;
   const auto surface = reconstruction::surface_of(context, littered(query.scan).view(), prepare);
   EXPECT_EQ(surface.points.size(),
             reconstruction::surface_of(context, query.scan.view(), prepare).points.size());

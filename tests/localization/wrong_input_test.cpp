@@ -39,7 +39,7 @@ TEST_F(WrongInput, NothingIsNotFound) {
   EXPECT_EQ(result.status, LocateStatus::not_found);
   EXPECT_TRUE(result.poses.empty());
   EXPECT_EQ(result.absent_probability, 1);
-  EXPECT_TRUE(locate(context, {}, map, LocateOptions::from_voxel_size(kVoxel)).empty());
+  EXPECT_TRUE(locate(context, {}, map, LocateOptions{RegistrationOptions{kVoxel}}).empty());
 }
 
 TEST_F(WrongInput, AnotherUnitIsRecognised) {
@@ -68,24 +68,23 @@ TEST_F(WrongInput, ATooSmallScanIsNotFound) {
     if ((p - query.scan.points.front()).norm() < 3 * kVoxel) small.points.push_back(p);
   ASSERT_GT(small.points.size(), 20u);
   const auto results = locate(context, {small.view(), query.scan.view()}, map,
-                              LocateOptions::from_voxel_size(kVoxel));
+                              LocateOptions{RegistrationOptions{kVoxel}});
   EXPECT_EQ(results[0].status, LocateStatus::not_found);
   EXPECT_EQ(results[1].status, LocateStatus::found);
 }
 
 TEST_F(WrongInput, VoxelSizesThatDoNotFit) {
   expect_error<InvalidArgument>(
-      [&] { locate(context, {query.scan.view()}, map, LocateOptions::from_voxel_size(0.05f)); },
+      [&] { locate(context, {query.scan.view()}, map, LocateOptions{RegistrationOptions{0.05f}}); },
       {"voxel_size", "0.05", "0.1"});
   MapOptions options = map_options();
-  options.prepare.voxel_size = 0;
-  expect_error<InvalidArgument>([&] { MapBuilder{options}; }, {"prepare.voxel_size"});
+  options.voxel_size = 0;
+  expect_error<InvalidArgument>([&] { MapBuilder{options}; }, {"voxel_size"});
   for (const float voxel : {1e-3f, 2.0f}) {
     PointCloud cloud;
     cloud.points = furnished_room(1, 1);
-    expect_error<InvalidArgument>(
-        [&] { prepare_map(cloud.view(), MapOptions::from_voxel_size(voxel)); },
-        {"voxel_size", "does not fit"});
+    expect_error<InvalidArgument>([&] { prepare_map(cloud.view(), MapOptions{voxel}); },
+                                  {"voxel_size", "does not fit"});
   }
 }
 
@@ -171,22 +170,22 @@ TEST_F(WrongInput, Arguments) {
   expect_error<InvalidArgument>(
       [&] {
         localization::find_changes(context, query.scan.view(), map, transposed,
-                                   localization::ChangeOptions::from_voxel_size(kVoxel));
+                                   localization::ChangeOptions{});
       },
       {"looks transposed"});
-  LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+  LocateOptions options = LocateOptions{RegistrationOptions{kVoxel}};
   options.candidates = 0;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"candidates", "0"});
-  options = LocateOptions::from_voxel_size(kVoxel);
+  options = LocateOptions{RegistrationOptions{kVoxel}};
   options.coarse_factor = 0.5;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"coarse_factor", "0.5"});
-  options = LocateOptions::from_voxel_size(kVoxel);
+  options = LocateOptions{RegistrationOptions{kVoxel}};
   options.coarse_tiles = 0;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"coarse_tiles", "0"});
-  options = LocateOptions::from_voxel_size(kVoxel);
+  options = LocateOptions{RegistrationOptions{kVoxel}};
   options.fine_tiles = 0;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"fine_tiles", "0"});
@@ -198,7 +197,7 @@ TEST_F(WrongInput, Arguments) {
                                    changes);
       },
       {"tolerance is 1e+300"});
-  options = LocateOptions::from_voxel_size(kVoxel);
+  options = LocateOptions{RegistrationOptions{kVoxel}};
   options.registration.calibration.offset = 1;  // of pairs: places have a fit of their own
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"registration.calibration", "of pairs"});
@@ -208,7 +207,7 @@ TEST_F(WrongInput, Arguments) {
                                 {"priors[0]", "radius"});
   expect_error<InvalidArgument>(
       [&] {
-        locate(context, {query.scan.view()}, map, LocateOptions::from_voxel_size(kVoxel), {},
+        locate(context, {query.scan.view()}, map, LocateOptions{RegistrationOptions{kVoxel}}, {},
                {"a", "b"});
       },
       {"names", "2"});

@@ -118,9 +118,7 @@ TEST_F(LoopCloserFaults, CloudsOfAnotherVoxelSizeOrWithoutPoints) {
   const std::vector<Eigen::Vector3f> points = scan_room(random);
   refused(
       [&] {
-        closer.add({50, 0, 0,
-                    prepare(context, PointCloudView(points),
-                            RegistrationOptions::from_voxel_size(0.5f).prepare)});
+        closer.add({50, 0, 0, prepare(context, PointCloudView(points), RegistrationOptions{0.5f})});
       },
       {"fragment 50", "0.5 m", "0.05 m"});
 }
@@ -141,13 +139,14 @@ TEST_F(LoopCloserFaults, ResultsThatAreNone) {
 
 TEST(LoopCloserStates, NoiseOfOptionsThatIsTooSmallIsRefusedWhereItIsUsed) {
   loop_closure::Options options;
-  options.graph.drift.min_translation = options.graph.loop_noise.translation = 1e-12;
+  options.graph.drift.min_translation = 1e-12;
+  options.host_noise.translation = 2e-11;  // of voxels of 5 cm
   LoopCloser closer = closer_of(options);
   for (int k = 0; k < 2; ++k) closer.add({k});
   expect_error<InvalidArgument>([&] { closer.add_odometry(1, 0, Pose::Identity()); },
                                 {"graph.drift", "1e+24"});
   expect_error<InvalidArgument>([&] { closer.add_loop(1, 0, Pose::Identity()); },
-                                {"graph.loop_noise", "1e+24"});
+                                {"host_noise", "e+2"});
   closer.add_odometry(1, 0, planar(1, 0, 0));  // was not taken
   EXPECT_EQ(closer.process().poses.size(), 2u);
 }

@@ -16,14 +16,13 @@ TEST(FlatScans, AreLoopsInTheirPlane) {
   for (const auto& [x, y, turn] : where) truth.push_back(Pose(pose_in_plan(x, y, turn).matrix()));
   const Sequence run = sequence(truth);
   loop_closure::Options options;
-  options.registration = RegistrationOptions::from_voxel_size(0.05f);
+  options.registration = RegistrationOptions{0.05f};
   LoopCloser closer(context, options);
   for (int k = 0; k < 5; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const std::vector<Eigen::Vector3f> scan =
         FloorPlan2d().scan(Eigen::Isometry3d(truth[at].matrix()), static_cast<unsigned>(k + 1));
-    closer.add({k, 0, double(k),
-                prepare(context, PointCloudView(scan), options.registration.prepare),
+    closer.add({k, 0, double(k), prepare(context, PointCloudView(scan), options.registration),
                 run.odometry[at], std::nullopt});
     if (k > 0) closer.add_odometry(k, k - 1, run.odometry[at - 1].inverse() * run.odometry[at]);
   }

@@ -57,7 +57,7 @@ TEST_F(Saving, GoesOnWithTheSameBits) {
 
 TEST_F(Saving, AStateOfAnotherVoxelSizeIsRefused) {
   closer.save(path);
-  LoopCloser coarse = closer_of(loop_closure::Options::from_voxel_size(0.5f));
+  LoopCloser coarse = closer_of(loop_closure::Options{RegistrationOptions{0.5f}});
   expect_error<InvalidArgument>([&] { coarse.load(path, nullptr); }, {path, "0.05 m", "0.5 m"});
   EXPECT_EQ(coarse.size(), 0u);
 }

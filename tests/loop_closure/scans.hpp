@@ -74,7 +74,7 @@ inline Scans scans_of_one_room(int count) {
 
 inline loop_closure::Options quick_options() {
   loop_closure::Options options;
-  options.registration = options.registration.with_quality(1);
+  options.registration.quality = 1;
   options.chunk = 1;
   return options;
 }

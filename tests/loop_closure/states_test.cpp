@@ -314,11 +314,11 @@ TEST(LoopStates, TheFactorIsThatOfThePoseGraph) {
 
 TEST(LoopStates, LengthsOfLoopsmartFollowTheVoxelSize) {
   const loop_closure::Options paper = loop_closure::Options::loopsmart(0.2f),
-                              ours = loop_closure::Options::from_voxel_size(0.2f);
-  EXPECT_EQ(paper.registration.prepare.voxel_size, 0.2f);
+                              ours = loop_closure::Options{RegistrationOptions{0.2f}};
+  EXPECT_EQ(paper.registration.voxel_size, 0.2f);
   EXPECT_EQ(paper.proposals.coarse_voxel_size, ours.proposals.coarse_voxel_size);
   EXPECT_EQ(paper.noise.translation, ours.noise.translation);
-  EXPECT_EQ(paper.graph.loop_noise.translation, ours.graph.loop_noise.translation);
+  EXPECT_EQ(paper.host_noise.translation, ours.host_noise.translation);
   EXPECT_EQ(paper.graph.line_process.odometry_weight, 1000);
 }
 

@@ -3,6 +3,7 @@
 #include <pcl/features/fpfh.h>
 #include <pcl/search/kdtree.h>
 
+#include "api/with_settings.hpp"
 #include "oracle/oracle.hpp"
 
 namespace gpureg::test {
@@ -16,7 +17,7 @@ FeatureComparison compare_features_with_pcl(const PreparedCloud& cloud) {
   estimation.setInputCloud(xyz);
   estimation.setInputNormals(pcl_normals(normals));
   estimation.setSearchMethod(tree);
-  estimation.setRadiusSearch(static_cast<double>(cloud.options().feature_radius));
+  estimation.setRadiusSearch(static_cast<double>(cloud.settings().feature_radius));
   pcl::PointCloud<pcl::FPFHSignature33> expected;
   estimation.compute(expected);
 
@@ -24,7 +25,7 @@ FeatureComparison compare_features_with_pcl(const PreparedCloud& cloud) {
   std::vector<char> usable(points.size(), 1);
   for (std::size_t k = 0; k < points.size(); ++k) {
     if (!normals[k].isZero(0)) continue;
-    const float reach = 2.01f * cloud.options().feature_radius;
+    const float reach = 2.01f * cloud.settings().feature_radius;
     for (std::size_t other = 0; other < points.size(); ++other)
       if ((points[other] - points[k]).norm() <= reach) usable[other] = 0;
   }
@@ -52,7 +53,7 @@ TEST(FpfhOracle, RandomSurfaces) {
     for (int repeat = 0; repeat < 4; ++repeat) {
       const std::vector<Eigen::Vector3f> points = random_surface(random, 30000, 2);
       const PreparedCloud cloud = prepare(Context::cpu(2), PointCloudView(points),
-                                          RegistrationOptions::from_voxel_size(voxel_size).prepare);
+                                          resolve(RegistrationOptions{voxel_size}).prepare);
       const FeatureComparison comparison = compare_features_with_pcl(cloud);
       folded.append(comparison.folded);
       whole.append(comparison.whole);

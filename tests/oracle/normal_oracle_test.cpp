@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "api/with_settings.hpp"
 #include "oracle/oracle.hpp"
 
 namespace gpureg::test {
@@ -56,14 +57,14 @@ PreparedCloud random_prepared(std::mt19937& random, float voxel_size,
   std::vector<Eigen::Vector3f> points = random_surface(random, 30000, 2);
   for (Eigen::Vector3f& p : points) p += offset;
   return prepare(Context::cpu(2), PointCloudView(points),
-                 RegistrationOptions::from_voxel_size(voxel_size).prepare);
+                 resolve(RegistrationOptions{voxel_size}).prepare);
 }
 
 }  // namespace
 
 Comparison compare_normals_with_pca(const PreparedCloud& cloud) {
   const auto points = cloud.points(), normals = cloud.normals();
-  const auto planes = planes_by_pca(points, static_cast<double>(cloud.options().normal_radius));
+  const auto planes = planes_by_pca(points, static_cast<double>(cloud.settings().normal_radius));
   Comparison comparison;
   for (std::size_t k = 0; k < points.size(); ++k)
     if (planes[k].well_defined && !normals[k].isZero(0))
@@ -73,12 +74,12 @@ Comparison compare_normals_with_pca(const PreparedCloud& cloud) {
 
 Comparison compare_normals_with_pcl(const PreparedCloud& cloud) {
   const auto points = cloud.points(), normals = cloud.normals();
-  const auto planes = planes_by_pca(points, static_cast<double>(cloud.options().normal_radius));
+  const auto planes = planes_by_pca(points, static_cast<double>(cloud.settings().normal_radius));
   pcl::NormalEstimation<pcl::PointXYZ, pcl::Normal> estimation;
   estimation.setInputCloud(pcl_points(points));
   estimation.setSearchMethod(
       pcl::search::KdTree<pcl::PointXYZ>::Ptr(new pcl::search::KdTree<pcl::PointXYZ>));
-  estimation.setRadiusSearch(static_cast<double>(cloud.options().normal_radius));
+  estimation.setRadiusSearch(static_cast<double>(cloud.settings().normal_radius));
   pcl::PointCloud<pcl::Normal> expected;
   estimation.compute(expected);
   Comparison comparison;

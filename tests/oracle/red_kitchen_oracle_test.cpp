@@ -2,6 +2,7 @@
 // The same comparisons on real fragments, which have edges, holes, stray points and noise.
 #include <gtest/gtest.h>
 
+#include "api/with_settings.hpp"
 #include "gpureg/io.hpp"
 #include "oracle/oracle.hpp"
 #include "support/data_folder.hpp"
@@ -14,8 +15,8 @@ std::vector<PreparedCloud> red_kitchen(const std::string& folder) {
   for (const int k : {0, 7, 13}) {
     PointCloud cloud = io::read_point_cloud(folder + "/cloud_bin_" + std::to_string(k) + ".ply");
     cloud.normals.clear();
-    clouds.push_back(prepare(Context::cpu(2), cloud.view(),
-                             RegistrationOptions::from_voxel_size(0.05f).prepare));
+    clouds.push_back(
+        prepare(Context::cpu(2), cloud.view(), resolve(RegistrationOptions{0.05f}).prepare));
   }
   return clouds;
 }

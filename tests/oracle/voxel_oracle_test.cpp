@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "api/with_settings.hpp"
 #include "oracle/oracle.hpp"
 
 namespace gpureg::test {
@@ -52,7 +53,7 @@ std::vector<Eigen::Vector3f> clear_points(std::mt19937& random, std::size_t coun
 // Small radii: only the voxels matter here.
 std::vector<Eigen::Vector3f> downsampled(const std::vector<Eigen::Vector3f>& points,
                                          float voxel_size) {
-  PrepareOptions options = RegistrationOptions::from_voxel_size(voxel_size).prepare;
+  PrepareSettings options = resolve(RegistrationOptions{voxel_size}).prepare;
   options.normal_radius = options.feature_radius = voxel_size;
   options.wide_feature_radius = 0;
   return prepare(Context::cpu(2), PointCloudView(points), options).points();

@@ -28,7 +28,7 @@ using test::Report;
 void add_map(const Context& context, const std::vector<PreparedCloud>& clouds,
              const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
              float voxel_size, Report& report) {
-  reconstruction::Options options = reconstruction::Options::from_voxel_size(voxel_size);
+  reconstruction::Options options{voxel_size};
   reconstruction::Reconstruction map =
       reconstruction::reconstruct_from_poses(clouds.size(), pairs, results, options);
   const auto poses = [&](const std::string& name) {
@@ -44,8 +44,8 @@ void add_map(const Context& context, const std::vector<PreparedCloud>& clouds,
   std::vector<reconstruction::Surface> surfaces;
   for (const PreparedCloud& cloud : clouds)
     surfaces.push_back({cloud.points(), cloud.normals(), {}});
-  const reconstruction::RefineReport refined = reconstruction::refine(
-      context, surfaces, map, reconstruction::RefineOptions::from_voxel_size(voxel_size));
+  const reconstruction::RefineReport refined =
+      reconstruction::refine(context, surfaces, map, reconstruction::RefineOptions{voxel_size});
   report.line("map rmse " + hex(refined.initial_rmse) + " " + hex(refined.final_rmse));
   poses("refined map");
 }
@@ -64,8 +64,8 @@ Report results_of(const Context& context) {
               hex(suggested.spacing) + " noise " + hex(suggested.noise));
 
   constexpr float kVoxelSize = 0.1f;
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(kVoxelSize);
-  const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options.prepare);
+  RegistrationOptions options{kVoxelSize};
+  const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options);
   report.clouds(clouds);
   std::vector<Pair> pairs;
   for (std::uint32_t i = 0; i < clouds.size(); ++i)
@@ -89,7 +89,7 @@ Report results_of(const Context& context) {
                 " evidence" + test::evidence_text(v.evidence));
 
   RegistrationOptions quadruples = RegistrationOptions::loopsmart(kVoxelSize);
-  quadruples.quadruples.count = 20'000;
+  quadruples.quadruples = 20'000;
   const std::vector<Pair> two{pairs[0], pairs[1]};
   report.pairs("quadruples", two, align_batch(context, clouds, two, quadruples));
 

@@ -50,7 +50,7 @@ std::vector<CalibrationSample> samples_of(const AlignedSet& set) {
 
 void add_audits(const Context& context, const AlignedSet& set, Report& report) {
   using namespace reconstruction;
-  const AuditOptions options = AuditOptions::from_voxel_size(set.options.prepare.voxel_size);
+  const AuditOptions options;
   std::vector<UnalignedIsometry3d> poses = poses_of(set);
   add_audit("audit", audit(context, set.clouds, poses, set.options, options), report);
   poses[2].translation().x() += 0.5;
@@ -58,8 +58,7 @@ void add_audits(const Context& context, const AlignedSet& set, Report& report) {
             report);
   const AuditedReconstruction map =
       reconstruct(context, set.clouds, set.pairs, set.results,
-                  reconstruction::Options::from_voxel_size(set.options.prepare.voxel_size), {},
-                  set.options, options);
+                  reconstruction::Options{set.options.voxel_size}, {}, set.options, options);
   add_audit("audited map", map.audit, report);
   for (std::size_t k = 0; k < map.map.scans.size(); ++k)
     report.line(
@@ -70,9 +69,9 @@ void add_audits(const Context& context, const AlignedSet& set, Report& report) {
 
 void add_places(const Context& context, const AlignedSet& set, Report& report) {
   using namespace localization;
-  const float voxel_size = set.options.prepare.voxel_size;
+  const float voxel_size = set.options.voxel_size;
   const std::vector<UnalignedIsometry3d> poses = poses_of(set);
-  MapBuilder builder(MapOptions::from_voxel_size(voxel_size));
+  MapBuilder builder(MapOptions{voxel_size});
   std::vector<PointCloudView> left;
   for (std::size_t k = 0; k < set.scans.size(); ++k)
     if (k != 1 && poses[k].matrix().allFinite())
@@ -83,7 +82,7 @@ void add_places(const Context& context, const AlignedSet& set, Report& report) {
   const PointCloud cloud = map.cloud();
   report.line("place map " + std::to_string(map.size()) + " points " + hash_of(cloud.points) +
               " normals " + hash_of(cloud.normals));
-  LocateOptions options = LocateOptions::from_voxel_size(voxel_size);
+  LocateOptions options = LocateOptions{RegistrationOptions{voxel_size}};
   options.min_confidence = 0.9999;  // all of the search
   const std::vector<LocateResult> results = locate(context, left, map, options);
   for (std::size_t k = 0; k < results.size(); ++k) {

@@ -22,10 +22,10 @@ int run(const std::string& folder, const std::vector<std::string>& numbers) {
     if (found != cameras.end()) scans.back().set_viewpoints(found->second);
   }
   const Context context = Context::cpu();
-  const auto options = RegistrationOptions::from_voxel_size(0.05f);
+  const auto options = RegistrationOptions{0.05f};
   std::vector<PointCloudView> views;
   for (const PointCloud& scan : scans) views.push_back(scan.view());
-  const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options.prepare);
+  const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options);
   std::vector<Pair> pairs;
   for (std::uint32_t i = 0; i < clouds.size(); ++i)
     for (std::uint32_t j = i + 1; j < clouds.size(); ++j) pairs.push_back({j, i});

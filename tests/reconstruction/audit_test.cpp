@@ -12,6 +12,7 @@
 #include "gpureg/reconstruction/mend.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
+#include "reconstruction/audit/in_units.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
 #include "reconstruction/audit/pair_verdicts.hpp"
 #include "support/audited_room.hpp"
@@ -46,7 +47,7 @@ Audit judged(std::uint32_t scans, const std::vector<AuditedPair>& pairs,
              const std::vector<Bond>& bonds = {}) {
   Audit audit;
   audit.pairs = pairs;
-  judge_connections(std::vector<std::uint32_t>(scans, 0), bonds, {}, {}, audit);
+  judge_connections(std::vector<std::uint32_t>(scans, 0), bonds, {}, in_units({}, 0.05f), audit);
   return audit;
 }
 
@@ -155,7 +156,7 @@ TEST(Connections, ACommonShiftContradicts) {
       pair.shift = shift.norm();
       pair.overlap_spread = Eigen::Matrix3d::Identity();
     }
-    judge_connections(std::vector<std::uint32_t>(kScans, 0), {}, poses, {}, audit);
+    judge_connections(std::vector<std::uint32_t>(kScans, 0), {}, poses, in_units({}, 0.05f), audit);
     return audit;
   };
   const Audit slipped = judged_with(0.1, 0.01);
@@ -225,7 +226,7 @@ TEST(MapConfidence, IsThatOfTheWeakestConnectionOnTheWay) {
     map.edges.back().target_from_source = UnalignedIsometry3d::Identity();
     map.edges.back().confidence = 0.99;
   }
-  judge_edges(audit, {}, false, map);
+  judge_edges(audit, in_units({}, 0.05f), false, map);
   for (std::size_t k = 0; k < map.edges.size(); ++k)
     EXPECT_EQ(map.edges[k].map_confidence, edges[k].weakest) << k;
 }
@@ -241,7 +242,7 @@ TEST(MapConfidence, OfRejectedPosesIsLessWherePlacesLookAlike) {
   map.edges[0].source = 1;
   const auto of_rejected = [&](double confidence, bool places_look_alike) {
     map.edges[0].confidence = confidence;
-    judge_edges(Audit(), {}, places_look_alike, map);
+    judge_edges(Audit(), in_units({}, 0.05f), places_look_alike, map);
     return map.edges[0].map_confidence;
   };
   EXPECT_EQ(of_rejected(0.999, false), 0.9) << "at most";
@@ -267,7 +268,7 @@ TEST(MapConfidence, TheMarginGrowsWithTheDistanceOfTheScans) {
     map.edges[0].confidence = 0.99;
     map.edges[0].target_from_source = UnalignedIsometry3d::Identity();
     map.edges[0].target_from_source.translation().x() = metres;
-    judge_edges(Audit(), {}, false, map);
+    judge_edges(Audit(), in_units({}, 0.05f), false, map);
     EXPECT_EQ(map.edges[0].map_confidence, metres > 5 ? 1.0 : 0.0);
   }
 }
@@ -323,7 +324,7 @@ TEST_F(AuditedRoom, IslandsAreMapsOfTheirOwn) {
   for (const std::size_t k : {3, 4, 5}) poses[k].translation() += Eigen::Vector3d(0.4, 0.3, 0.1);
   EXPECT_EQ(audited(poses).verdict(), AuditVerdict::contradicted);
   const Reconstruction map = map_of_poses(poses, {0, 0, 0, 1, 1, 1});
-  const Audit result = audit(context, clouds, map, options, AuditOptions::from_voxel_size(0.1f));
+  const Audit result = audit(context, clouds, map, options, AuditOptions{});
   EXPECT_EQ(result.verdict(), AuditVerdict::sound);
   EXPECT_EQ(result.pairs.size(), 6u);
   ASSERT_EQ(result.islands.size(), 2u);
@@ -334,7 +335,7 @@ TEST_F(AuditedRoom, IslandsAreMapsOfTheirOwn) {
 
 TEST_F(AuditedRoom, IsEndedByItsCaller) {
   const Audit found = audited(with_slip(3, 0.6));
-  AuditOptions stopped = AuditOptions::from_voxel_size(0.1f);
+  AuditOptions stopped;
   int asked = 0;
   stopped.should_stop = [&] { return ++asked == 2; };
   EXPECT_THROW(mend(context, clouds, with_slip(3, 0.6), found, options, stopped), Cancelled);
@@ -432,7 +433,7 @@ TEST_F(AuditedRoom, ScansWithoutPointsSayNothing) {
   const float none = 0;
   PointCloudView empty;
   empty.points = &none;
-  clouds[4] = prepare(context, empty, options.prepare);
+  clouds[4] = prepare(context, empty, options);
   const Audit result = audited(world_from_scan);
   EXPECT_EQ(result.count(PairVerdict::supports), 6u) << "of four scans";
   EXPECT_EQ(result.count(ConnectionVerdict::undecided), 2u);
@@ -467,8 +468,8 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
   add(5, 1);
   add(4, 2);
   EXPECT_EQ(reconstruct_from_poses(6, pairs, results).islands.size(), 1u);
-  const AuditedReconstruction out = reconstruct(context, clouds, pairs, results, {}, {}, options,
-                                                AuditOptions::from_voxel_size(0.1f));
+  const AuditedReconstruction out =
+      reconstruct(context, clouds, pairs, results, {}, {}, options, AuditOptions{});
   ASSERT_EQ(out.map.islands.size(), 2u);
   EXPECT_EQ(out.map.islands[1].scans, (std::vector<std::uint32_t>{4, 5}));
   EXPECT_EQ(out.audit.verdict(), AuditVerdict::sound);

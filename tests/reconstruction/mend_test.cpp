@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "fields/in_units.hpp"
+#include "fields/reconstruction.hpp"
+#include "reconstruction/audit/in_units.hpp"
 #include "reconstruction/audit/joins.hpp"
 #include "support/audited_room.hpp"
 #include "support/registration_result.hpp"
@@ -28,7 +31,7 @@ struct MendedRoom : AuditedRoom {
           << k;
   }
 
-  AuditOptions audit_options = AuditOptions::from_voxel_size(0.1f);
+  AuditOptions audit_options;
 };
 
 TEST_F(MendedRoom, ASlipIsMended) {
@@ -91,8 +94,9 @@ struct TwoIslands : MendedRoom {
     results.push_back(result_of(pose, confidence));
   }
   std::vector<Odometry> joins() const {
-    return confirmed_joins(context, clouds, pairs, results, {}, map, Options::from_voxel_size(0.1f),
-                           options, audit_options);
+    return confirmed_joins(context, clouds, pairs, results, {}, map,
+                           fields::in_units(Options{0.1f}, 0.1f), options,
+                           in_units(audit_options, 0.1f));
   }
 
   Reconstruction map;

@@ -139,7 +139,7 @@ TEST(Reconstruct, RefusesBadInput) {
   reconstruction::Options options;
   options.min_connection_confidence = 0;
   EXPECT_THROW(PairResults(1).map(options), InvalidArgument);
-  EXPECT_THROW(reconstruction::Options::from_voxel_size(-1), InvalidArgument);
+  EXPECT_THROW(PairResults(1).map(reconstruction::Options{-1}), InvalidArgument);
 }
 
 TEST(Reconstruct, GraphHasThePlacedScansAndAcceptedEdges) {

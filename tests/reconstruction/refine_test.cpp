@@ -46,7 +46,7 @@ TEST(Refine, RejectsEdgesThatSurfacesContradict) {
   rooms.data.add(4, 0, 0.95, off);
   auto map = rooms.data.map();
   RefineOptions options;
-  options.max_edge_error = 0.05;
+  options.max_edge_error = 1;  // voxel of 5 cm
   const auto report = reconstruction::refine(rooms.surfaces, map, options);
   EXPECT_EQ(report.rejected_edges, 1u);
   EXPECT_FALSE(map.edges.back().accepted);
@@ -69,8 +69,8 @@ TEST(Refine, FarPointsWeighLess) {
 TEST(Refine, SurfacesHaveTheGivenViewpointsAlone) {
   const Surface points = room(1);
   PointCloudView cloud(points.points);
-  const PrepareOptions options;
-  const PrepareOptions finer = reconstruction::surface_options(options);
+  const RegistrationOptions options;
+  const RegistrationOptions finer = reconstruction::surface_options(options);
   const float viewpoint[] = {1, 1, 1};
   for (const std::size_t count : {0, 1}) {
     cloud.viewpoints = count > 0 ? viewpoint : nullptr;
@@ -92,7 +92,7 @@ TEST(Refine, RefusesBadInput) {
   surfaces[1].points.resize(3);
   EXPECT_THROW(reconstruction::refine(surfaces, map), InvalidArgument);
   RefineOptions options;
-  options.final_distance = 1;
+  options.final_distance = 10;
   EXPECT_THROW(reconstruction::refine(std::vector<Surface>(2), map, options), InvalidArgument);
 }
 

@@ -28,7 +28,7 @@ std::vector<Eigen::Vector3f> thinned(const std::vector<Eigen::Vector3f>& points)
 
 class UnknownScale : public testing::Test {
  protected:
-  UnknownScale() : options(RegistrationOptions::from_voxel_size(0.1f)) {
+  UnknownScale() : options(RegistrationOptions{0.1f}) {
     std::mt19937 random(11);
     target = thinned(test::scan_room(random));
     truth = test::random_pose(random);
@@ -159,8 +159,8 @@ TEST_F(UnknownScale, RefusesWrongRanges) {
   refused(nan, 2, {"scale.least is nan"});
   refused(1, std::numeric_limits<double>::infinity(), {"scale.most is inf"});
   refused(3, 2, {"scale is 3 to 2", "smaller end first"});
-  options.prepare.voxel_size = 0;
-  refused(1, 2, {"voxel_size"});
+  options.prepare.downsample = false;
+  refused(1, 2, {"prepare.downsample is false"});
   options.method = RegistrationMethod::quadruples;
   refused(1, 2, {"method"});
 }

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "api/prepare_copies.hpp"
+#include "api/with_settings.hpp"
 #include "scale/ladder.hpp"
 #include "support/scan.hpp"
 
@@ -28,7 +29,7 @@ TEST(PreparedCopies, HaveTheSidesOfOneOfThem) {
   std::mt19937 random(7);
   const Eigen::Isometry3d pose = test::random_pose(random);
   const std::vector<Eigen::Vector3f> scan = test::moved(pose, test::scan_room(random));
-  const PrepareOptions options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  const PrepareSettings options = resolve(RegistrationOptions{0.05f}).prepare;
   const Context context = Context::cpu(2);
   std::vector<std::unique_ptr<scale::ScaledCloud>> clouds;
   std::vector<PointCloudView> views;

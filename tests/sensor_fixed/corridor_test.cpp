@@ -27,9 +27,9 @@ TEST(SensorFixedPoints, HoldNoPoseAlongACorridor) {
   for (const PointCloud& scan : scans) views.push_back(scan.view());
   const Context context = Context::cpu();
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    RegistrationOptions options = RegistrationOptions::from_voxel_size(0.2f);
+    RegistrationOptions options{0.2f};
     options.seed = seed;
-    const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options.prepare);
+    const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options);
     for (const Step& step : {Step{1, 0, {-0.03, -0.08, 1.56}}, Step{2, 1, {-0.02, -0.06, 1.83}},
                              Step{2, 0, {-0.08, -0.04, 3.36}}}) {
       const RegistrationResult r =

@@ -55,12 +55,12 @@ std::vector<RegistrationResult> align_set(std::vector<Points> scans) {
     for (std::size_t k = rows.size(); k-- > 0;)
       scan.erase(scan.begin() + static_cast<std::ptrdiff_t>(rows[k]));
   }
-  const RegistrationOptions options = RegistrationOptions::from_voxel_size(0.1f);
+  const RegistrationOptions options{0.1f};
   const Context context = Context::cpu(2);
   std::vector<Pair> pairs;
   for (std::uint32_t i = 0; i < scans.size(); ++i)
     for (std::uint32_t j = i + 1; j < scans.size(); ++j) pairs.push_back({j, i});
-  return align_batch(context, prepare_batch(context, test::views_of(scans), options.prepare), pairs,
+  return align_batch(context, prepare_batch(context, test::views_of(scans), options), pairs,
                      options);
 }
 

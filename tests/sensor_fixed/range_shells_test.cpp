@@ -156,8 +156,7 @@ TEST_F(RangeShells, ArePreparedAsIfTheyWereNotThere) {
   const std::size_t added = points.size() - room_.size();
   points.insert(points.begin() + 7, Eigen::Vector3f::Constant(std::nanf("")));
   const Context context = Context::cpu(2);
-  PrepareOptions options;
-  options.voxel_size = 0.1f;
+  RegistrationOptions options{0.1f};
   const PreparedCloud expected = prepare(context, PointCloudView(room_), options),
                       cloud = prepare(context, PointCloudView(points), options);
   EXPECT_EQ(cloud.points(), expected.points());
@@ -168,7 +167,7 @@ TEST_F(RangeShells, ArePreparedAsIfTheyWereNotThere) {
   EXPECT_EQ(s.invalid_points, 1u);
   EXPECT_NEAR(s.largest_range, 30, 1e-4);
   EXPECT_EQ(expected.statistics().range_limit_points, 0u);
-  options.keep_range_limits = true;
+  options.prepare.keep_range_limits = true;
   const PreparedCloud all = prepare(context, PointCloudView(points), options);
   EXPECT_GT(all.size(), cloud.size());
   EXPECT_EQ(all.statistics().range_limit_points, 0u);

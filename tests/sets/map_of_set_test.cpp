@@ -12,7 +12,7 @@ namespace {
 
 using namespace reconstruction;
 
-MapOptions quick() { return MapOptions::of(quick_options()); }
+MapOptions quick() { return {quick_options()}; }
 
 std::vector<Eigen::Matrix4d> poses(const Reconstruction& map) {
   std::vector<Eigen::Matrix4d> out;

@@ -63,7 +63,7 @@ class Journal : public ::testing::Test {
 
   const TemporaryFolder folder_;
   const std::string path_ = folder_ / "pairs.journal";
-  const RegistrationOptions options_ = RegistrationOptions::from_voxel_size(0.1f);
+  const RegistrationOptions options_{0.1f};
   const std::vector<Pair> pairs_{{1, 0}, {2, 0}, {2, 1}};
 };
 
@@ -76,7 +76,7 @@ TEST_F(Journal, GivesResultsBackWithoutLoss) {
   EXPECT_EQ(journal.result(2).status, RegistrationStatus::skipped);
   journal.add(2, result_number(3));
   EXPECT_EQ(sets::bytes_of(journal.result(2)), sets::bytes_of(result_number(3)));
-  EXPECT_EQ(PairJournal::setting(path_, "options.prepare.voxel_size"), "0.1");
+  EXPECT_EQ(PairJournal::setting(path_, "options.voxel_size"), "0.1");
   const JournalContents contents = read_journal(path_);
   ASSERT_EQ(contents.pairs.size(), 3u);
   EXPECT_EQ(contents.clouds[contents.pairs[2].source].name, "c");
@@ -133,7 +133,7 @@ TEST_F(Journal, NamesWhatIsNotOfItsRun) {
   write_two();
   const std::string before = content();
   RunIdentity other = run();
-  other.settings = RunIdentity::settings_of(RegistrationOptions::from_voxel_size(0.1f));
+  other.settings = RunIdentity::settings_of(RegistrationOptions{0.1f});
   EXPECT_EQ(why_not(other, pairs_), "");
   RegistrationOptions seed = options_;
   seed.seed = 2;

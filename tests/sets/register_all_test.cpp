@@ -27,7 +27,7 @@ std::vector<std::vector<char>> results_of(PairJournal& journal) {
 TEST(RegisterAll, ContextsAndMemoryChangeNothing) {
   const SmallSet set(kScans);
   const Context context = Context::cpu();
-  const std::vector<PreparedFragment> prepared = prepare_all(context, set, quick_options().prepare);
+  const std::vector<PreparedFragment> prepared = prepare_all(context, set, quick_options());
   ASSERT_EQ(prepared.size(), kScans);
   PairJournal whole = journal_of(set);
   register_all(context, clouds_of(prepared), whole, quick_options());
@@ -43,8 +43,7 @@ TEST(RegisterAll, ContextsAndMemoryChangeNothing) {
 
 TEST(RegisterAll, MemoryIsBounded) {
   const SmallSet set(kScans);
-  const PreparedCloud first =
-      prepare_all(Context::cpu(), set, quick_options().prepare).front().cloud;
+  const PreparedCloud first = prepare_all(Context::cpu(), set, quick_options()).front().cloud;
   const std::size_t one = first.size() * (33 * 4 + 96), budget = 3 * one;
   FragmentAligner aligner(Context::cpu(), set, quick_options(), budget);
   std::size_t most = 0, received = 0;

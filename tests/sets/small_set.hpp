@@ -27,7 +27,7 @@ class SmallSet : public FragmentSet {
 
   std::size_t size() const override { return clouds_.size(); }
   std::string name(std::size_t k) const override { return "scan " + std::to_string(k); }
-  LoadedCloud read(std::size_t k, const PrepareOptions&) const override {
+  LoadedCloud read(std::size_t k, const RegistrationOptions&) const override {
     if (bad.count(k) > 0) throw IoError(name(k) + " is truncated");
     return LoadedCloud(clouds_[k]);
   }
@@ -38,8 +38,6 @@ class SmallSet : public FragmentSet {
   std::vector<PointCloud> clouds_;
 };
 
-inline RegistrationOptions quick_options() {
-  return RegistrationOptions::from_voxel_size(0.15f).with_quality(0);
-}
+inline RegistrationOptions quick_options() { return RegistrationOptions{0.15f, 0}; }
 
 }  // namespace gpureg::test

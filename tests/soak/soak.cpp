@@ -109,14 +109,13 @@ Bytes bytes_of(const std::vector<RegistrationResult>& results) {
 }
 
 struct Soak {
-  RegistrationOptions options = RegistrationOptions::from_voxel_size(kVoxelSize);
+  RegistrationOptions options{kVoxelSize};
   std::vector<PointCloud> scans = test::portable_scans();
   std::vector<Pair> pairs = all_pairs(scans.size());  // 84
 
   std::vector<PreparedCloud> prepare_all(const Context& context) const {
     std::vector<PreparedCloud> out;
-    for (const PointCloud& scan : scans)
-      out.push_back(prepare(context, scan.view(), options.prepare));
+    for (const PointCloud& scan : scans) out.push_back(prepare(context, scan.view(), options));
     return out;
   }
 
@@ -152,8 +151,8 @@ struct Soak {
     for (std::size_t k = 0; k < total; ++k) {
       {
         const Context context = make();
-        const PreparedCloud a = prepare(context, scans[0].view(), options.prepare),
-                            b = prepare(context, scans[1].view(), options.prepare);
+        const PreparedCloud a = prepare(context, scans[0].view(), options),
+                            b = prepare(context, scans[1].view(), options);
         const std::vector<char> found = test::bytes(align(context, a, b, options));
         if (k == 0) expected = found;
         different += found != expected;

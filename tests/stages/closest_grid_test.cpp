@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "api/with_settings.hpp"
 #include "cpu/prepare/reachable_blocks.hpp"
 #include "pipeline/checks.hpp"
 #include "support/prepared.hpp"
@@ -48,7 +49,7 @@ void expect_exact(const CpuCloud& cloud, std::mt19937& random, int queries, floa
 TEST(ClosestGrid, EqualsExhaustiveSearch) {
   std::mt19937 random(1);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   for (const std::size_t n :
        {std::size_t(1), std::size_t(2), std::size_t(50), std::size_t(4000), std::size_t(30000)}) {
     expect_exact(
@@ -63,7 +64,7 @@ TEST(ClosestGrid, ExactForSmallerDistancesAndOtherScales) {
   std::mt19937 random(2);
   Exec exec(2);
   for (const float scale : {0.001f, 1.0f, 50.0f}) {
-    PrepareOptions options;
+    PrepareSettings options;
     options.voxel_size *= scale;
     options.normal_radius *= scale;
     options.feature_radius *= scale;
@@ -79,7 +80,7 @@ TEST(ClosestGrid, ExactForSmallerDistancesAndOtherScales) {
 TEST(ClosestGrid, DuplicatesAndUndownsampledClouds) {
   std::mt19937 random(3);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = 0;
   std::vector<Vec3> points = test::cube(random, 300, 0.5f);
   const std::vector<Vec3> copy = points;
@@ -96,7 +97,7 @@ TEST(ClosestGrid, DuplicatesAndUndownsampledClouds) {
 TEST(ClosestGrid, LatticePointsAndQueries) {
   std::mt19937 random(4);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = 0;
   std::vector<Vec3> points;
   for (int x = -4; x <= 4; ++x)
@@ -120,7 +121,7 @@ TEST(ClosestGrid, QueriesFarAwayOrNotANumberFindNothing) {
   std::mt19937 random(5);
   Exec exec(1);
   const auto cloud =
-      test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1.0f)), PrepareOptions{});
+      test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1.0f)), PrepareSettings{});
   const float nan = std::nanf("");
   for (const Vec3 q : {Vec3{1e30f, 0, 0}, Vec3{nan, 0, 0}, Vec3{0, -1e9f, 0}, Vec3{0, 0, INFINITY}})
     EXPECT_EQ(find_closest(cloud->view().closest, cloud->points.data(), q, 0.005f).index, kNoValue);

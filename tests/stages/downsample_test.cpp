@@ -5,6 +5,7 @@
 #include <map>
 #include <tuple>
 
+#include "api/with_settings.hpp"
 #include "cpu/common/stages.hpp"
 #include "gpureg/error.hpp"
 #include "support/prepared.hpp"
@@ -15,7 +16,7 @@ namespace {
 
 DownsampledCloud downsample_one(const RawCloud& raw, float voxel_size) {
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = voxel_size;
   return downsample(exec, {&raw, 1}, options).front();
 }

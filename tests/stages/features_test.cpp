@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "api/with_settings.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
@@ -14,7 +15,7 @@ namespace {
 TEST(Features, FpfhAgreesWithExhaustiveNeighbours) {
   std::mt19937 random(1);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   const auto cloud =
       test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 8000, 2.0f)), options);
   const std::size_t n = cloud->points.size();
@@ -69,7 +70,7 @@ TEST(Features, RowsWithoutAFeatureAreMarked) {
   std::vector<Vec3> points = test::bumpy_sheet(random, 8000, 2.0f);
   points.push_back({30, 30, 30});
   Exec exec(2);
-  const auto cloud = test::prepare_one(exec, test::raw_cloud(points), PrepareOptions{});
+  const auto cloud = test::prepare_one(exec, test::raw_cloud(points), PrepareSettings{});
   std::size_t missing = 0;
   for (std::size_t i = 0; i < cloud->points.size(); ++i) missing += !cloud->features.valid[i];
   EXPECT_GE(missing, 1u);
@@ -86,7 +87,7 @@ TEST(Features, CustomRowsPassThroughAndNaNIsMarked) {
   RawCloud raw = test::raw_cloud(points);
   raw.features = rows.data();
   raw.feature_dimension = raw.feature_stride = 7;
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = 0;
   Exec exec(1);
   const auto cloud = test::prepare_one(exec, raw, options);
@@ -100,13 +101,13 @@ TEST(Features, CustomRowsPassThroughAndNaNIsMarked) {
 TEST(Features, TheWideOnesSeeNormalsThatAreAsMuchWider) {
   std::mt19937 random(3);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   const std::vector<Vec3> points = test::bumpy_sheet(random, 20000, 2.0f);
   const RawCloud raw = test::raw_cloud(points);
   auto clouds = downsample(exec, {&raw, 1}, options);
   const auto grids = build_grids(exec, clouds, options);
   const auto wide = compute_wide_features(exec, clouds, grids, options);
-  PrepareOptions coarse = options;
+  PrepareSettings coarse = options;
   coarse.feature_radius = options.wide_feature_radius;
   const auto expected = compute_features(
       exec, clouds, estimate_normals(exec, clouds, grids, 0.1f * (0.4f / 0.25f)), grids, coarse);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "api/with_settings.hpp"
 #include "confidence/degeneracy_search.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
@@ -25,7 +26,7 @@ std::vector<std::uint32_t> seeds_of(const std::vector<Mode>& modes) {
 
 TEST(MergeModes, WithinAShareOfTheLimits) {
   Exec exec(1);
-  RegistrationOptions options;
+  RegistrationSettings options;
   options.evidence.mode_angle = 10;
   options.evidence.mode_distance = 0.4f;
   const std::vector<Mode> all{mode_at(0, 0, 0),    mode_at(0, 0.19, 1), mode_at(4.9, 0, 2),
@@ -69,7 +70,7 @@ TEST(SelectModes, WeakOnesOnlyAmongTheFirst) {
 
 TEST(CandidatesFromModes, KeepPoseAndSeedAndCountTheMatches) {
   Exec exec(1);
-  RegistrationOptions options;
+  RegistrationSettings options;
   options.compatibility.consensus_distance = 0.1f;
   MatchSet matches;
   for (int k = 0; k < 3; ++k) {
@@ -118,7 +119,7 @@ TEST(DropReturned, DisplacementOfThePointsInCorrespondences) {
   const auto cloud = test::prepare_one(exec, test::raw_cloud(sheet), {});
   const PairOutcome outcome = test::verified_in_place(exec, *cloud, *cloud);
   const PairInput pair{cloud.get(), cloud.get(), {}, {}, {}};
-  RegistrationOptions options;
+  RegistrationSettings options;
   const ReturnTest test =
       confidence::search_degeneracies({&pair, 1}, {&outcome, 1}, options, 1).at(0).returned;
   const double limit = static_cast<double>(kReturned * options.prepare.max_correspondence_distance);

@@ -3,20 +3,21 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "api/with_settings.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
 namespace gpureg::cpu {
 namespace {
 
-std::vector<Vec3> normals_of(Exec& exec, const RawCloud& raw, const PrepareOptions& options) {
+std::vector<Vec3> normals_of(Exec& exec, const RawCloud& raw, const PrepareSettings& options) {
   return test::prepare_one(exec, raw, options)->normals;
 }
 
 TEST(Normals, AgreeWithDoubleOverAllNeighbours) {
   std::mt19937 random(1);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   int compared = 0;
   for (int trial = 0; trial < 10; ++trial) {
     const std::vector<Vec3> points = test::bumpy_sheet(random, 20000, 2.5f);
@@ -58,7 +59,7 @@ TEST(Normals, PointAtTheNearestViewpoint) {
   raw.viewpoints = &viewpoints[0].x;
   raw.viewpoint_count = 2;
   Exec exec(1);
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = 0;
   for (const Vec3& n : normals_of(exec, raw, options)) EXPECT_GT(n.z, 0.999f);
   raw.viewpoints = nullptr;
@@ -88,7 +89,7 @@ int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints,
     raw.viewpoint_count = viewpoints.size();
   }
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = 0;
   options.depth_maps = depth_maps;
   int down = 0;
@@ -115,7 +116,7 @@ TEST(Normals, NoneOnALineOrForLonePoints) {
     line.push_back({0.01f * static_cast<float>(k), 0.02f * static_cast<float>(k), 0});
   line.push_back({9, 9, 9});
   Exec exec(1);
-  PrepareOptions options;
+  PrepareSettings options;
   options.voxel_size = 0;
   for (const Vec3& n : normals_of(exec, test::raw_cloud(line), options)) EXPECT_TRUE(is_zero(n));
 }

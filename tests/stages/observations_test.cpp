@@ -2,6 +2,7 @@
 // Free space: points in front of an observed surface violate it, weighted by their incidence.
 #include <gtest/gtest.h>
 
+#include "api/with_settings.hpp"
 #include "pipeline/evidence_test.hpp"
 #include "support/outcome_bytes.hpp"
 #include "support/prepared.hpp"
@@ -77,7 +78,7 @@ TEST(Observations, EvidenceInGroupsIsThatOfEachPoint) {
     const auto a = seen_from(exec, points_a, {0.5f, 0.3f, 2.0f}),
                b = seen_from(exec, points_b, {1.5f, -0.2f, 1.0f});
     const ModeOutcome outcome = test::verified_in_place(exec, *a, *b).modes[0];
-    const RegistrationOptions options;
+    const RegistrationSettings options;
     const EvidenceTest test = pipeline::evidence_test(options);
     const Rigid there = to_rigid(outcome.pose);
     const CloudView s = a->view(), t = b->view();

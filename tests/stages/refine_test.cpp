@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include "api/with_settings.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
@@ -10,11 +11,11 @@ namespace {
 TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
   std::mt19937 random(1);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   const auto cloud =
       test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 30000, 2.0f)), options);
   const PairView pair = test::pair_view(*cloud, *cloud);
-  const RegistrationOptions registration;
+  const RegistrationSettings registration;
   std::normal_distribution<double> normal;
   for (int trial = 0; trial < 20; ++trial) {
     std::vector<BestPose> start(1);
@@ -48,12 +49,12 @@ TEST(Refine, OffOrWithoutAPoseChangesNothing) {
   std::mt19937 random(2);
   Exec exec(1);
   const auto cloud =
-      test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1)), PrepareOptions{});
+      test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1)), PrepareSettings{});
   const PairView pair = test::pair_view(*cloud, *cloud);
-  RegistrationOptions off;
+  RegistrationSettings off;
   off.refine.max_iterations = 0;
   std::vector<BestPose> start(1);
-  EXPECT_FALSE(refine_poses(exec, {&pair, 1}, start, RegistrationOptions{})[0].found);
+  EXPECT_FALSE(refine_poses(exec, {&pair, 1}, start, resolve(RegistrationOptions{}))[0].found);
   start[0].found = true;
   start[0].pose.tx = 0.3;
   EXPECT_EQ(refine_poses(exec, {&pair, 1}, start, off)[0].pose.tx, 0.3);

@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "api/with_settings.hpp"
 #include "cpu/common/stages.hpp"
 
 namespace gpureg::cpu {
@@ -27,7 +28,7 @@ TEST(Sample, KeepsExactlyThePassingQuadruples) {
   for (const std::size_t n : {std::size_t(4), std::size_t(5), std::size_t(300)})
     for (const std::uint32_t count : {1u, 7u, 65536u, 100003u}) {
       const std::vector<Matches> matches = random_matches(random, n);
-      RegistrationOptions options;
+      RegistrationSettings options;
       options.quadruples.count = count;
       options.quadruples.max_survivors = count;
       options.seed = 0x123456789abcdefull + n;
@@ -50,7 +51,7 @@ TEST(Sample, KeepsExactlyThePassingQuadruples) {
 TEST(Sample, FewerThanFourMatchesGiveNone) {
   std::mt19937 random(2);
   Exec exec(2);
-  RegistrationOptions options;
+  RegistrationSettings options;
   options.quadruples.count = 1000;
   for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(3)})
     EXPECT_TRUE(sample_quadruples(exec, random_matches(random, n), options)[0].empty());

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "algorithm/inlier.hpp"
+#include "api/with_settings.hpp"
 #include "cpu/common/cell_summary.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
@@ -63,14 +64,14 @@ class Score : public ::testing::Test {
   }
   std::mt19937 random;
   Exec exec;
-  PrepareOptions options;
+  PrepareSettings options;
   std::shared_ptr<CpuCloud> a, b;
 };
 
 TEST_F(Score, SupportIsTheExhaustiveOne) {
   for (const float angle : {30.0f, 90.0f, 180.0f})
     for (const float distance : {0.075f, 0.04f}) {
-      RegistrationOptions registration;
+      RegistrationSettings registration;
       registration.quadruples.max_normal_angle = angle;
       registration.prepare.max_correspondence_distance = distance;
       const InlierTest test = inlier_test(distance, angle);
@@ -120,7 +121,7 @@ TEST_F(Score, BoundsNeverLie) {
 TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
   for (const float angle : {30.0f, 180.0f})
     for (const float distance : {0.075f, 0.05f}) {
-      RegistrationOptions registration;
+      RegistrationSettings registration;
       registration.quadruples.max_normal_angle = angle;
       registration.prepare.max_correspondence_distance = distance;
       std::vector<Hypotheses> hypotheses(1);
@@ -151,9 +152,9 @@ TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
 
 TEST_F(Score, NoHypothesesNoPose) {
   const PairView pair = test::pair_view(*a, *b);
-  EXPECT_FALSE(
-      score_hypotheses(exec, {&pair, 1}, std::vector<Hypotheses>(1), RegistrationOptions{})[0]
-          .found);
+  EXPECT_FALSE(score_hypotheses(exec, {&pair, 1}, std::vector<Hypotheses>(1),
+                                resolve(RegistrationOptions{}))[0]
+                   .found);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "algorithm/evidence.hpp"
+#include "api/with_settings.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
@@ -71,7 +72,7 @@ TEST(SurfaceSides, EndAtTheNextSurface) {
 TEST(SurfaceSides, EqualAMarchOverAMapOfCells) {
   std::mt19937 random(3);
   Exec exec(2);
-  PrepareOptions options;
+  PrepareSettings options;
   using Key = std::tuple<int, int, int>;
   for (int trial = 0; trial < 4; ++trial) {
     options.surface_side_distance = trial < 2 ? 0.5f : 0.37f;
@@ -114,7 +115,7 @@ TEST(SurfaceSides, EqualAMarchOverAMapOfCells) {
 
 TEST(SurfaceSides, NoneWhereSwitchedOffOrTooWide) {
   Exec exec(1);
-  PrepareOptions options;
+  PrepareSettings options;
   options.surface_side_distance = 0;
   EXPECT_EQ(seen_from(exec, floor_at(0), {0, 0, 2}, options)->surface_sides.view().words, nullptr);
   EXPECT_EQ(seen_from(exec, {}, {0, 0, 2})->surface_sides.view().words, nullptr);

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "api/outcome.hpp"
+#include "api/with_settings.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
@@ -17,8 +18,8 @@ TEST(VerifyPoses, InformationMatricesFollowTheirDefinitions) {
   std::vector<Vec3> shape = test::bumpy_sheet(random, 8000, 2.0f), moved = shape;
   // away from the origin, where the matrices have mixed blocks
   for (Vec3& p : shape) p = p + Vec3{3, -2, 1};
-  const auto source = test::prepare_one(exec, test::raw_cloud(shape), PrepareOptions{});
-  const auto target = test::prepare_one(exec, test::raw_cloud(moved), PrepareOptions{});
+  const auto source = test::prepare_one(exec, test::raw_cloud(shape), PrepareSettings{});
+  const auto target = test::prepare_one(exec, test::raw_cloud(moved), PrepareSettings{});
   const PairView pair = test::pair_view(*source, *target);
   std::vector<BestPose> pose(1);
   pose[0].found = true;
@@ -27,7 +28,7 @@ TEST(VerifyPoses, InformationMatricesFollowTheirDefinitions) {
   pose[0].pose.ty = -0.007;
   pose[0].pose.z = 0.01;
   pose[0].pose.w = std::sqrt(1 - 1e-4);
-  RegistrationOptions options;
+  RegistrationSettings options;
   const Verification verified = verify_poses(exec, {&pair, 1}, pose, options)[0];
 
   Eigen::Matrix<double, 6, 6> redwood = Eigen::Matrix<double, 6, 6>::Zero(), open3d = redwood;

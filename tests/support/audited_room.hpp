@@ -14,7 +14,7 @@ namespace gpureg::test {
 /// Scans of a room, each without another slice of it, at their places in the room.
 struct AuditedRoom : ::testing::Test {
   AuditedRoom() {
-    options = RegistrationOptions::from_voxel_size(0.1f);
+    options = RegistrationOptions{0.1f};
     for (unsigned k = 0; k < 6; ++k) {
       std::mt19937 random(k + 1);
       world_from_scan.emplace_back(k == 0 ? Eigen::Isometry3d::Identity() : random_pose(random));
@@ -26,13 +26,12 @@ struct AuditedRoom : ::testing::Test {
       view.size = points.size();
       view.viewpoints = sensor.data();
       view.viewpoint_count = 1;
-      clouds.push_back(prepare(context, view, options.prepare));
+      clouds.push_back(prepare(context, view, options));
     }
   }
 
   reconstruction::Audit audited(const std::vector<UnalignedIsometry3d>& poses) const {
-    return reconstruction::audit(context, clouds, poses, options,
-                                 reconstruction::AuditOptions::from_voxel_size(0.1f));
+    return reconstruction::audit(context, clouds, poses, options, reconstruction::AuditOptions{});
   }
 
   std::vector<UnalignedIsometry3d> with_slip(std::size_t scan, double metres) const {

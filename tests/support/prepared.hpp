@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "api/with_settings.hpp"
 #include "cpu/common/stages.hpp"
 #include "pipeline/align_by_quadruples.hpp"
 #include "pipeline/prepare.hpp"
@@ -21,7 +22,7 @@ inline RawCloud raw_cloud(const std::vector<Vec3>& points) {
 }
 
 inline std::shared_ptr<cpu::CpuCloud> prepare_one(cpu::Exec& exec, const RawCloud& raw,
-                                                  const PrepareOptions& options) {
+                                                  const PrepareSettings& options) {
   return pipeline::prepare(exec, Span<const RawCloud>{&raw, 1}, options).front();
 }
 
@@ -31,7 +32,7 @@ inline PairView pair_view(const cpu::CpuCloud& source, const cpu::CpuCloud& targ
 
 /// A cloud that was seen from one place.
 inline std::shared_ptr<cpu::CpuCloud> seen_from(cpu::Exec& exec, const std::vector<Vec3>& points,
-                                                Vec3 eye, const PrepareOptions& options = {}) {
+                                                Vec3 eye, const PrepareSettings& options = {}) {
   RawCloud raw = raw_cloud(points);
   raw.viewpoints = &eye.x;
   raw.viewpoint_count = 1;
@@ -52,7 +53,8 @@ inline PairOutcome verified_in_place(cpu::Exec& exec, const cpu::CpuCloud& sourc
                    static_cast<double>(source.origin[2] - target.origin[2])};
   PairOutcome outcome;
   cpu::verify_modes(exec, {&pair, 1}, std::vector<cpu::MatchSet>(1),
-                    std::vector<cpu::Candidates>(1), {modes}, RegistrationOptions{}, {&outcome, 1});
+                    std::vector<cpu::Candidates>(1), {modes}, resolve(RegistrationOptions{}),
+                    {&outcome, 1});
   return outcome;
 }
 

@@ -78,7 +78,7 @@ Json calibration_document(const CalibrationResult& result, const RegistrationOpt
                      {"loop_consistency", to_json(result.loop_consistency)},
                      {"trajectory", to_json(result.trajectory)}};
   json["calibration_error"] = {{"before", result.error_before}, {"after", result.error_after}};
-  json["voxel_size"] = to_json(options)["prepare"]["voxel_size"];
+  json["voxel_size"] = to_json(options)["voxel_size"];
   json["preset"] = "default";  // the only one with a confidence
   json["quality"] = quality;
   json["options"] = scene_options(options);

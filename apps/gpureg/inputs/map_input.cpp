@@ -74,8 +74,7 @@ PreparedMap map_of_scans(const Context& context, const ScanInput& input,
   Progress progress("mapping", "scans", folder.numbers.size(), false);
   for (std::size_t k = 0; k < folder.numbers.size(); ++k) {
     if (!poses[k].matrix().allFinite()) continue;
-    const PointCloud cloud =
-        folder.read(k, mesh_spacing(options.prepare.voxel_size), MeshNote::none);
+    const PointCloud cloud = folder.read(k, mesh_spacing(options.voxel_size), MeshNote::none);
     try {
       builder.add_scan(context, cloud.view(), poses[k]);
     } catch (const InvalidArgument& error) {
@@ -124,8 +123,7 @@ PreparedMap MapInput::prepare(const Context& context,
   if (saved) return *saved;
   try {
     if (kind == Kind::scans) return map_of_scans(context, {path, recursive}, options);
-    const PointCloud cloud =
-        read_cloud(path, mesh_spacing(options.prepare.voxel_size), MeshNote::print);
+    const PointCloud cloud = read_cloud(path, mesh_spacing(options.voxel_size), MeshNote::print);
     return localization::prepare_map(cloud.view(), options);
   } catch (const InvalidArgument& error) {
     throw InvalidArgument(path + ": " + error.what());
@@ -135,7 +133,7 @@ PreparedMap MapInput::prepare(const Context& context,
 PointCloud read_scan(const std::string& path, const Context& context,
                      const localization::MapOptions& options) {
   if (!io::names_scans(path))
-    return read_cloud(path, mesh_spacing(options.prepare.voxel_size), MeshNote::print);
+    return read_cloud(path, mesh_spacing(options.voxel_size), MeshNote::print);
   return MapInput(path).prepare(context, options).cloud();
 }
 

@@ -99,12 +99,12 @@ FolderSet::FolderSet(FragmentFolder folder, bool quiet, bool infer_viewpoint)
       infer_viewpoint_(infer_viewpoint),
       seen_(folder_.numbers.size()) {}
 
-LoadedCloud FolderSet::read(std::size_t k, const PrepareOptions& options) const {
+LoadedCloud FolderSet::read(std::size_t k, const RegistrationOptions& options) const {
   Seen& seen = seen_[k];
   const bool first = seen.fingerprint.empty(), tell = first && !quiet_;
   PointCloud cloud =
       folder_.read(k, mesh_spacing(options.voxel_size), tell ? MeshNote::print : MeshNote::none);
-  if (tell && options.depth_maps > 0) viewpoints_.see(cloud, folder_.scans[k].path);
+  if (tell && options.prepare.depth_maps > 0) viewpoints_.see(cloud, folder_.scans[k].path);
   const bool infer_viewpoint = infer_viewpoint_ || !cloud.viewpoints.empty();
   if (first)
     seen = {fingerprint_of(cloud.view()) + (infer_viewpoint ? "" : " without viewpoint"),
@@ -135,7 +135,8 @@ PreparedSizes sizes_of(const FolderSet& set, const std::vector<std::size_t>& sca
 }
 
 PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
-                              const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
+                              const RegistrationOptions& options, bool quiet,
+                              bool infer_viewpoint) {
   const FolderSet set(FragmentFolder(input, quiet), quiet, infer_viewpoint);
   PreparedFolder folder{set.folder(), {}, {}, {}};
   Progress progress("preparing", "fragments", set.size(), quiet);

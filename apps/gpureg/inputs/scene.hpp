@@ -68,7 +68,7 @@ class FolderSet : public FragmentSet {
   std::size_t size() const override { return folder_.numbers.size(); }
   std::string name(std::size_t k) const override { return folder_.scans[k].name; }
   std::string label(std::size_t k) const override { return folder_.scans[k].path; }
-  LoadedCloud read(std::size_t k, const PrepareOptions& options) const override;
+  LoadedCloud read(std::size_t k, const RegistrationOptions& options) const override;
   std::string fingerprint(std::size_t k) const override { return seen_[k].fingerprint; }
   std::size_t readers() const override { return 1; }  // what they note has an order
 
@@ -112,7 +112,7 @@ struct PreparedFolder : FragmentFolder {
 /// infer_viewpoint: of fragments without a sensor position, see PointCloudView. Throws IoError,
 /// also where unusable fragments leave less than a pair.
 PreparedFolder prepare_folder(const Context& context, const ScanInput& input,
-                              const PrepareOptions& options, bool quiet,
+                              const RegistrationOptions& options, bool quiet,
                               bool infer_viewpoint = true);
 
 /// Reads cameras.txt and a list of pairs before the clouds are read. Throws IoError as

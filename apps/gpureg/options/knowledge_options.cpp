@@ -63,7 +63,7 @@ void ViewpointChoice::note_place(const char* option, const PreparedCloud& cloud,
   const Eigen::Vector3f place = (direction(numbers_of(text)) - cloud.origin()).cast<float>();
   // One point within a voxel may be a return of the sensor itself, a surface has about three.
   constexpr std::ptrdiff_t kSurface = 2;
-  const float voxel = cloud.options().voxel_size;
+  const float voxel = cloud.voxel_size();
   const std::vector<Eigen::Vector3f> points = cloud.points();
   const std::ptrdiff_t near =
       std::count_if(points.begin(), points.end(),

@@ -18,7 +18,7 @@ namespace gpureg::cli {
 
 namespace {
 
-/// "evidence" of "evidence.sample=1024", "min_confidence" of "min_confidence=0.5".
+/// "prepare" of "prepare.depth_maps=4", "min_confidence" of "min_confidence=0.5".
 std::string group_of(const std::string& assignment) {
   return assignment.substr(0, assignment.find_first_of(".="));
 }
@@ -27,8 +27,7 @@ std::string group_of(const std::string& assignment) {
 void refuse_idle(const RegistrationOptions& options, const std::string& assignment) {
   const bool quadruples = options.method == RegistrationMethod::quadruples;
   const std::vector<std::string> idle =
-      quadruples ? std::vector<std::string>{"compatibility", "evidence", "min_confidence",
-                                            "accept_symmetry", "calibration"}
+      quadruples ? std::vector<std::string>{"quality", "accept_symmetry", "calibration"}
                  : std::vector<std::string>{"quadruples"};
   if (std::find(idle.begin(), idle.end(), group_of(assignment)) != idle.end())
     throw InvalidArgument("--set " + assignment + " does nothing with the method " +
@@ -72,7 +71,7 @@ void MethodOptions::add_to(Verb verb) {
       "with --preset loopsmart, "
       "from this inlier ratio on (0.3). 0: every best candidate");
   verb.option("--set", set,
-              "Any other option under its name in the JSON, for experts: evidence.sample=1024, "
+              "Any other option under its name in the JSON, for experts: prepare.depth_maps=4, "
               "accept_symmetry=true; may be repeated")
       .type_name("NAME=VALUE")
       .one_at_a_time();
@@ -121,9 +120,8 @@ RegistrationOptions MethodOptions::registration() const {
   set_voxel_size_origin(automatic_voxel_size    ? VoxelSizeOrigin::automatic
                         : given("--voxel-size") ? VoxelSizeOrigin::given
                                                 : VoxelSizeOrigin::standard);
-  RegistrationOptions options = preset == "loopsmart"
-                                    ? RegistrationOptions::loopsmart(voxel_size)
-                                    : RegistrationOptions::from_voxel_size(voxel_size, quality);
+  RegistrationOptions options = preset == "loopsmart" ? RegistrationOptions::loopsmart(voxel_size)
+                                                      : RegistrationOptions{voxel_size, quality};
   options.seed = seed;
   if (!calibration.empty()) {
     if (options.method == RegistrationMethod::quadruples)
@@ -136,21 +134,10 @@ RegistrationOptions MethodOptions::registration() const {
   if (min_score && !(*min_score >= 0 && *min_score <= 1))
     throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
                           ", expected a number from 0 to 1");
-  if (min_score && options.method == RegistrationMethod::quadruples)
-    options.quadruples.min_inlier_ratio = static_cast<float>(*min_score);
-  else if (min_score)
-    options.min_confidence = *min_score;
+  if (min_score) options.min_confidence = *min_score;
   for (const std::string& assignment : set) set_option(options, assignment);
   for (const std::string& assignment : set) refuse_idle(options, assignment);
-  try {
-    options.validate();
-  } catch (const InvalidArgument& error) {
-    // What follows from the voxel size was not given either.
-    const std::string what = error.what();
-    if (!set.empty() || what.find("voxel_size") != std::string::npos) throw;
-    throw InvalidArgument("voxel_size is " + significant(static_cast<double>(voxel_size), 6) +
-                          ", from which follows: " + what);
-  }
+  options.validate();
   return options;
 }
 
@@ -165,7 +152,7 @@ void MethodOptions::choose_voxel_size(const std::vector<PointCloudView>& clouds,
 
 void MethodOptions::choose_voxel_size(const ScanInput& input, const std::string& journal) {
   if (!automatic_voxel_size) return;
-  const std::string of_run = PairJournal::setting(journal, "options.prepare.voxel_size");
+  const std::string of_run = PairJournal::setting(journal, "options.voxel_size");
   if (!of_run.empty()) {
     voxel_size = std::strtof(of_run.c_str(), nullptr);
     return;

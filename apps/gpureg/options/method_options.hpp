@@ -16,7 +16,7 @@ namespace gpureg::cli {
 
 /// The options that `register` and `batch` have in common.
 struct MethodOptions {
-  float voxel_size = PrepareOptions{}.voxel_size;
+  float voxel_size = RegistrationOptions{}.voxel_size;
   bool automatic_voxel_size = false;  ///< to be chosen by the clouds, see choose_voxel_size
   std::string preset = "default";
   std::string backend = "auto";
@@ -24,7 +24,7 @@ struct MethodOptions {
   std::uint32_t quality = kDefaultQuality;
   std::uint64_t seed = RegistrationOptions{}.seed;
   std::optional<double> min_score;  ///< none: the preset's own
-  std::vector<std::string> set;     ///< further options, as "evidence.sample=1024"
+  std::vector<std::string> set;     ///< further options, as "prepare.depth_maps=4"
   std::string calibration;          ///< file of `gpureg calibrate`; empty: none
 
   void add_to(Verb verb);

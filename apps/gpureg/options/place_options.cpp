@@ -87,7 +87,7 @@ void choose_voxel_size(MethodOptions& method, const MapInput& input,
     if (!note.empty()) std::cerr << "gpureg: note: " << note << std::endl;
     return;
   }
-  const float of_map = input.saved->options().prepare.voxel_size;
+  const float of_map = input.saved->options().voxel_size;
   if (method.given("--voxel-size") && (method.automatic_voxel_size || method.voxel_size != of_map))
     throw InvalidArgument("--voxel-size is not that of " + input.path + ", which was made with " +
                           significant(static_cast<double>(of_map), 6));
@@ -99,8 +99,7 @@ void choose_voxel_size(MethodOptions& method, const MapInput& input,
 }
 
 localization::LocateOptions locate_options(const MethodOptions& method) {
-  auto options = localization::LocateOptions::from_voxel_size(method.voxel_size, method.quality);
-  options.registration = method.registration();
+  localization::LocateOptions options{method.registration()};
   // The default of pairs is not that of places. Here and in the JSON there is one threshold.
   if (method.sets_confidence()) options.min_confidence = options.registration.min_confidence;
   options.registration.min_confidence = options.min_confidence;

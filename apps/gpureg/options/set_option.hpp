@@ -7,7 +7,7 @@
 
 namespace gpureg::cli {
 
-/// Sets the option that "evidence.sample=1024" names. Its range is left to validate().
+/// Sets the option that "prepare.depth_maps=4" names. Its range is left to validate().
 /// @throws InvalidArgument naming what is unknown, or what does not fit.
 void set_option(RegistrationOptions& options, const std::string& assignment);
 

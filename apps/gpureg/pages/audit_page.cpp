@@ -175,7 +175,7 @@ std::string pair_picture(const AuditRun& run, const AuditedPair& pair) {
     return placed(run.scene.clouds[k].viewpoints(), run.scene.clouds[k],
                   run.map.scans[k].island_from_scan, 50);
   };
-  const double margin = 6 * static_cast<double>(run.options.prepare.voxel_size);
+  const double margin = 6 * static_cast<double>(run.options.voxel_size);
   const Points a = points_of(pair.target), b = points_of(pair.source);
   Points all = a;
   all.insert(all.end(), b.begin(), b.end());

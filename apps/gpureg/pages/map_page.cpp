@@ -70,7 +70,7 @@ class PagePoints {
     const std::size_t share =
         std::max(kLeastScanPoints, kPagePoints / std::max<std::size_t>(1, run.made.map.placed()));
     std::vector<std::vector<std::size_t>> kept(surfaces.size());
-    spacing_.assign(surfaces.size(), run.options.prepare.voxel_size / 2);
+    spacing_.assign(surfaces.size(), run.options.voxel_size / 2);
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       const reconstruction::Scan& scan = run.made.map.scans[k];
       if (!scan.placed) continue;

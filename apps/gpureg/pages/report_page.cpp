@@ -40,8 +40,8 @@ img { max-width: 100%; border: 1px solid #e4e4de; } .correct { color: #2f9e5b; }
 std::string effort_per_pair(const Json& document) {
   const bool quadruples = text_of(document, "/options/method") == "quadruples";
   const std::string count =
-      text_of(document, quadruples ? "/options/quadruples/count" : "/options/compatibility/seeds");
-  return count.empty() ? "" : count + (quadruples ? " hypotheses" : " seeds") + " per pair";
+      text_of(document, quadruples ? "/options/quadruples" : "/options/quality");
+  return count.empty() ? "" : quadruples ? count + " hypotheses per pair" : "quality " + count;
 }
 
 std::string run_facts(const Json& document) {
@@ -52,7 +52,7 @@ std::string run_facts(const Json& document) {
   std::string facts;
   for (const std::string& text :
        {fact("gpureg ", "/environment/version", "") + fact(" on ", "/environment/description", ""),
-        fact("voxel size ", "/options/prepare/voxel_size", ""), effort_per_pair(document),
+        fact("voxel size ", "/options/voxel_size", ""), effort_per_pair(document),
         fact("random seed ", "/options/seed", "")})
     if (!text.empty()) facts += (facts.empty() ? "" : " &middot; ") + escaped(text);
   return facts.empty() ? "" : "<p class=\"sub\">" + facts + "</p>\n";
@@ -88,9 +88,7 @@ std::string figure(const std::string& title, const std::string& content) {
 
 // The lowest score of a reported pair.
 auto threshold(const ResultFile& result) {
-  const bool quadruples = text_of(result.document, "/options/method") == "quadruples";
-  return number_of(result.document,
-                   quadruples ? "/options/quadruples/min_inlier_ratio" : "/options/min_confidence");
+  return number_of(result.document, "/options/min_confidence");
 }
 
 std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth& truth,

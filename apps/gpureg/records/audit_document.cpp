@@ -109,7 +109,7 @@ Json audit_document(const AuditRun& run, const Context& context) {
   json["environment"] = environment(context);
   json["folder"] = run.input.path;
   json["poses"] = run.poses_file;
-  json["voxel_size"] = run.options.prepare.voxel_size;
+  json["voxel_size"] = run.options.voxel_size;
   json["seconds"] = run.seconds;
   json["fragments"] = Json::array();
   for (const io::ScanFile& scan : run.scene.scans)

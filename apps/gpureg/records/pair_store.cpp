@@ -54,7 +54,7 @@ StoredPairs read_pairs_of_journal(const std::string& path, const FragmentFolder&
                                   float voxel_size) {
   JournalContents journal = read_journal(path);
   for (const auto& [name, value] : journal.settings)
-    if (name == "options.prepare.voxel_size")
+    if (name == "options.voxel_size")
       check_voxel_size_of(std::strtof(value.c_str(), nullptr), path, voxel_size);
   StoredPairs out{{}, std::move(journal.results)};
   try {
@@ -107,7 +107,7 @@ StoredPairs read_pairs(const std::string& path, const FragmentFolder& folder, fl
                   ": its scores are those of `gpureg consistency`; give the JSON of the batch");
   if (document.contains("complete") && document["complete"] == false)
     throw IoError(path + ": is of an unfinished batch");
-  const Json::json_pointer place("/options/prepare/voxel_size");
+  const Json::json_pointer place("/options/voxel_size");
   if (document.contains(place) && document[place].is_number())
     check_voxel_size_of(document[place].get<float>(), path, voxel_size);
   return out;

@@ -60,7 +60,7 @@ ScaledRun run_scaled(const Context& context, const ScanInput& input, const std::
     std::vector<Pair> part;
     for (const std::size_t k : places) {
       part.push_back(run.pairs[k]);
-      run.voxel_sizes[k] = options.prepare.voxel_size;
+      run.voxel_sizes[k] = options.voxel_size;
     }
     ScaledCallbacks callbacks;
     callbacks.on_result = [&](std::size_t, const ScaledResult&) { progress.update(++done); };

@@ -153,7 +153,7 @@ int mend(const AuditVerbOptions& o, const Context& context, const AuditRun& run,
 }
 
 int audit_and_mend(const AuditVerbOptions& o, const Context& context, AuditRun& run) {
-  auto options = reconstruction::AuditOptions::from_voxel_size(run.options.prepare.voxel_size);
+  reconstruction::AuditOptions options;
   options.should_stop = InterruptGuard::requested;
   const auto start = std::chrono::steady_clock::now();
   run.audit = reconstruction::audit(context, run.scene.clouds, run.map, run.options, options);
@@ -181,7 +181,7 @@ int run_audit(const AuditVerbOptions& o) {
   for (const std::string& file : mended_files(o, run.map.islands.size()))
     outputs.push_back({"--mend", file});
   check_outputs(outputs, inputs);
-  run.scene = prepare_folder(context, o.input, run.options.prepare, o.quiet);
+  run.scene = prepare_folder(context, o.input, run.options, o.quiet);
   if (!run.scene.unusable.empty()) run.map = read_map_poses(o.poses, run.scene.scans, o.input.path);
   for (std::size_t k = 0; k < run.map.scans.size(); ++k)
     if (!run.map.scans[k].placed) run.missing.push_back(run.scene.numbers[k]);

@@ -74,13 +74,12 @@ class Batch {
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
     if (can_have_journal(o_.log)) o_.resume.check(o_.journal());
     const InterruptGuard guard;
-    scene_ =
-        prepare_folder(context_, o_.input, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
+    scene_ = prepare_folder(context_, o_.input, options_, o_.quiet, o_.viewpoint.text != "none");
     if (scene_.interrupted) {
       std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
       return kInterrupted;
     }
-    o_.method.check_sizes(options_.prepare.voxel_size, scene_.sizes, o_.quiet);
+    o_.method.check_sizes(options_.voxel_size, scene_.sizes, o_.quiet);
     const std::vector<Pair> pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.input.path + " holds one scan, " + scene_.scans[0].name +

@@ -91,10 +91,9 @@ int run(Options o) {
   const MapInput input(o.map, o.recursive);
   choose_voxel_size(o.method, input, {o.scan});
   const LocateOptions options = locate_options(o.method);
-  MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
-  of_map.prepare = options.registration.prepare;
-  ChangeOptions change = ChangeOptions::from_voxel_size(o.method.voxel_size);
-  if (o.tolerance) change.tolerance = *o.tolerance;
+  const MapOptions of_map{o.method.voxel_size, options.registration.prepare};
+  ChangeOptions change;
+  if (o.tolerance) change.tolerance = *o.tolerance / static_cast<double>(o.method.voxel_size);
   change.validate();
   // A bad scan shall show before the map is prepared.
   PointCloud scan = read_scan(o.scan, context, input.options_or(of_map));

@@ -24,25 +24,22 @@ struct ConsistencyOptions {
   std::optional<double> min_confidence;
 };
 
-double option_of(const Json& document, const char* group, const char* name, double otherwise) {
+double option_of(const Json& document, const char* name, double otherwise) {
   const auto options = document.find("options");
   if (options == document.end() || !options->is_object()) return otherwise;
-  const Json& holder = group == nullptr ? *options : options->value(group, Json::object());
-  const auto found = holder.find(name);
-  return found != holder.end() && found->is_number() ? found->get<double>() : otherwise;
+  const auto found = options->find(name);
+  return found != options->end() && found->is_number() ? found->get<double>() : otherwise;
 }
 
 LoopConsistencyOptions loop_consistency_options(const ConsistencyOptions& o, const Json& document) {
   if (o.voxel_size) {
     // The batch would have taken no other one either.
-    RegistrationOptions::from_voxel_size(*o.voxel_size).validate();
-    return LoopConsistencyOptions::from_voxel_size(*o.voxel_size);
+    RegistrationOptions{*o.voxel_size}.validate();
+    return {*o.voxel_size};
   }
-  double voxel_size = option_of(document, "prepare", "voxel_size", 0);
-  if (voxel_size == 0)
-    voxel_size = option_of(document, "prepare", "max_correspondence_distance", 0) / 1.5;
+  const double voxel_size = option_of(document, "voxel_size", 0);
   if (voxel_size == 0) throw IoError(o.result + ": does not say the voxel size; give --voxel-size");
-  return LoopConsistencyOptions::from_voxel_size(static_cast<float>(voxel_size));
+  return {static_cast<float>(voxel_size)};
 }
 
 RegistrationResult result_of(const PairRecord& record, const Json& json) {
@@ -121,7 +118,7 @@ int run(const ConsistencyOptions& o) {
   Input input = read_input(o.result);
   const LoopConsistencyOptions options = loop_consistency_options(o, input.document);
   const double min_confidence =
-      o.min_confidence.value_or(option_of(input.document, nullptr, "min_confidence", 0.5));
+      o.min_confidence.value_or(option_of(input.document, "min_confidence", 0.5));
   std::vector<PairConsistency> consistency;
   try {
     consistency = loop_consistency(input.pairs, input.results, options);

@@ -210,8 +210,7 @@ int run(LocateRun o) {
   for (const LocatedScan& scan : o.scans) paths.push_back(scan.path);
   choose_voxel_size(o.method, input, paths);
   const LocateOptions options = locate_options(o.method);
-  MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
-  of_map.prepare = options.registration.prepare;
+  const MapOptions of_map{o.method.voxel_size, options.registration.prepare};
   // A bad scan shall show before the map is prepared.
   const std::vector<PointCloud> scans = read_scans(o, context, input.options_or(of_map), options);
   const PreparedMap map = input.prepare(context, of_map);

@@ -150,7 +150,7 @@ class Reconstruct {
     reconstruction::MapInput known;
     if (!o_.odometry.empty()) known = read_odometry(o_.odometry, run_.scene.scans, o_.input.path);
     if (!o_.results.empty()) {
-      StoredPairs stored = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
+      StoredPairs stored = read_pairs(o_.results, run_.scene, run_.options.voxel_size);
       known.pairs = std::move(stored.pairs);
       known.results = std::move(stored.results);
     } else if (o_.prune == 0) {
@@ -163,7 +163,7 @@ class Reconstruct {
   }
 
   reconstruction::MapOptions options() const {
-    auto options = reconstruction::MapOptions::of(run_.options);
+    reconstruction::MapOptions options{run_.options};
     options.graph.threads = static_cast<int>(o_.method.threads);
     options.graph.drift = o_.drift;
     options.with_audit = !o_.no_audit;
@@ -192,8 +192,8 @@ class Reconstruct {
       set_.print_notes(made.scans, made.prepared);
       run_.scene.leave_out(made.unusable);
       if (run_.aligned_here)
-        o_.method.check_sizes(run_.options.prepare.voxel_size,
-                              sizes_of(set_, made.scans, made.prepared), o_.quiet);
+        o_.method.check_sizes(run_.options.voxel_size, sizes_of(set_, made.scans, made.prepared),
+                              o_.quiet);
     };
     callbacks.on_aligned = [this](const MapOfSet& made) {
       progress_.end();

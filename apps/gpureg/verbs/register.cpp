@@ -385,8 +385,8 @@ int run(RegisterOptions o) {
     return asking(o, source_cloud, target_cloud, action);
   };
   asking_pair([&] {
-    check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
-    check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
+    check_voxel_size(options.voxel_size, extent_of(source_cloud.points), o.source);
+    check_voxel_size(options.voxel_size, extent_of(target_cloud.points), o.target);
   });
   ViewpointNote viewpoints;
   if (options.prepare.depth_maps > 0) {
@@ -394,8 +394,7 @@ int run(RegisterOptions o) {
     viewpoints.see(target_cloud, o.target);
   }
   const auto prepared = [&](const PointCloudView& cloud, const std::string& file) {
-    return asking_pair(
-        [&] { return prepare_batch(context, {cloud}, options.prepare, {file}).front(); });
+    return asking_pair([&] { return prepare_batch(context, {cloud}, options, {file}).front(); });
   };
   const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
   const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
@@ -441,8 +440,9 @@ int run(RegisterOptions o) {
               << ", the result is of " << timed.quality << "\n";
 
   if (!o.json.empty()) {
-    Json json = document(o, o.time_budget ? options.with_quality(timed.quality) : options, context,
-                         source, target, result);
+    RegistrationOptions used = options;
+    if (o.time_budget) used.quality = timed.quality;
+    Json json = document(o, used, context, source, target, result);
     if (o.time_budget)
       json["time_budget"] = {{"ms", *o.time_budget},
                              {"used_ms", timed.milliseconds},

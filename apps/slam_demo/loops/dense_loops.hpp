@@ -35,7 +35,7 @@ class DenseLoops {
   std::vector<gpureg::loop_closure::Loop> process(std::vector<Fragment> fragments) {
     for (Fragment& f : fragments) {
       const gpureg::PreparedCloud cloud =
-          gpureg::prepare(context_, f.cloud().view(), options_.registration.prepare);
+          gpureg::prepare(context_, f.cloud().view(), options_.registration);
       if (cloud.size() > 0) f.node.cloud = cloud;
       closer_.add(f.node);
       for (const auto& [before, before_from_this] : f.odometry)

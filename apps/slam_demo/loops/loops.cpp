@@ -32,8 +32,9 @@ LoopClosing::LoopClosing(const gpureg::Context& context, Map& map, const Pinhole
       options_(options),
       dense_(context,
              [&] {
-               auto o = options.loopsmart ? lc::Options::loopsmart(options.voxel_size)
-                                          : lc::Options::from_voxel_size(options.voxel_size);
+               auto o = options.loopsmart
+                            ? lc::Options::loopsmart(options.voxel_size)
+                            : lc::Options{gpureg::RegistrationOptions{options.voxel_size}};
                if (options.loopsmart)
                  o.registration = gpureg::RegistrationOptions::loopsmart(options.voxel_size);
                o.optimize = false;  // the keyframes are optimised here

@@ -20,7 +20,7 @@ class Default:
         self.options = self.make_options()
 
     def make_options(self):
-        return self.gpureg.RegistrationOptions.from_voxel_size(VOXEL)
+        return self.gpureg.RegistrationOptions(voxel_size=VOXEL)
 
     def version(self):
         return self.gpureg.__version__
@@ -32,7 +32,7 @@ class Default:
             cloud.raw,
             cloud.raw_normals,
             viewpoints=cloud.viewpoints,
-            options=self.options.prepare,
+            options=self.options,
             context=self.context,
         )
 

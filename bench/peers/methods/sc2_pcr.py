@@ -67,13 +67,11 @@ class SecondOrder:
         return "on numpy " + np.__version__
 
     def prepare(self, cloud):
-        options = self.gpureg.PrepareOptions(
-            voxel_size=0.0,
-            normal_radius=2 * VOXEL,
-            feature_radius=5 * VOXEL,
-            max_correspondence_distance=1.5 * VOXEL,
-            wide_feature_radius=0.0,
-            depth_maps=0,
+        options = self.gpureg.RegistrationOptions(
+            voxel_size=VOXEL,
+            prepare=self.gpureg.PrepareOptions(
+                downsample=False, wide_feature_radius=0.0, depth_maps=0
+            ),
         )
         prepared = self.gpureg.prepare(
             cloud.points, cloud.normals, options=options, context=self.gpureg.Context.cpu()

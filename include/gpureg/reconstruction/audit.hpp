@@ -20,11 +20,11 @@ class Cancelled : public Error {
   using Error::Error;
 };
 
-/// Options of audit(). The lengths are for voxels of 5 cm.
+/// Options of audit().
 struct AuditOptions {
-  /// ICP may move a pair by so much before it contradicts its pose, metres, > 0: what is left of
-  /// the errors of a good map.
-  double max_shift = 0.15;
+  /// ICP may move a pair by this many voxels of the registration before it contradicts its pose,
+  /// > 0: what is left of the errors of a good map. Of larger voxels than 0.05 by the fourth root.
+  double max_shift = 3;
   /// The same for each metre between the scans, >= 0: how far a map may bend.
   double max_shift_per_metre = 0.02;
   /// Probability, (0, 1), up to which a connection is contradicted.
@@ -36,11 +36,6 @@ struct AuditOptions {
   /// Asked every tenth of a second, in the thread of the call; true ends the call, which throws
   /// Cancelled. May be empty.
   std::function<bool()> should_stop;
-
-  /// Every length from the voxel size of the registration; max_shift beyond 5 cm by its fourth
-  /// root.
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static AuditOptions from_voxel_size(float voxel_size);
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

@@ -17,26 +17,28 @@ namespace gpureg::reconstruction {
 /// Noise of a registered pose, for the information matrices of the pose graph. A registration is
 /// never more certain than this, however many points it aligns: their errors are correlated.
 struct EdgeNoiseOptions {
-  double translation = 0.03;  ///< standard deviation at the centre of the overlap, metres, > 0
-  double rotation = 0.7;      ///< standard deviation, degrees, > 0
-  /// Standard deviation along a direction that the geometry does not hold at all, metres, >=
+  double translation = 0.6;  ///< standard deviation at the centre of the overlap, voxels, > 0
+  double rotation = 0.7;     ///< standard deviation, degrees, > 0
+  /// Standard deviation along a direction that the geometry does not hold at all, voxels, >=
   /// translation. Between the two, it grows with the root of the ratio of the information
   /// eigenvalues.
-  double max_translation = 0.4;
+  double max_translation = 8;
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;
 };
 
-/// Options of reconstruct() and reconstruct_from_poses(). The lengths are for voxels of 5 cm.
+/// Options of reconstruct() and reconstruct_from_poses(). Lengths are in voxels.
 struct Options {
-  LoopConsistencyOptions consistency;
-  EdgeNoiseOptions noise;
+  /// Of the clouds, in the unit of the points: also of `consistency`. A call that has options of
+  /// the registration takes theirs.
+  float voxel_size = 0.05f;
+  LoopConsistencyOptions consistency = {};
+  EdgeNoiseOptions noise = {};
   /// Noise of odometry without an information matrix.
-  pose_graph::DriftOptions drift;
-  /// Length in which PoseEvidence::information_eigenvalues count rotations, metres, > 0: twenty
-  /// voxels.
-  double information_unit = 1.0;
+  pose_graph::DriftOptions drift = {};
+  /// Length in which PoseEvidence::information_eigenvalues count rotations, > 0.
+  double information_unit = 20;
   /// Confidence, after loop consistency, from which a pair takes part, (0, 1].
   double min_edge_confidence = 0.1;
   /// Probability from which the connection between two parts of the map counts, (0, 1]: that one of
@@ -46,10 +48,6 @@ struct Options {
   std::uint32_t modes = 4;       ///< number of modes of a pair that take part, 1..16
   std::uint32_t min_island = 2;  ///< scans of an island, >= 2; smaller ones are left out
   int threads = 0;               ///< 0: one per core. Results do not depend on it.
-
-  /// Every length from the voxel size of the registration.
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static Options from_voxel_size(float voxel_size);
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

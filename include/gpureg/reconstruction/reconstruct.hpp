@@ -19,10 +19,10 @@ namespace gpureg::reconstruction {
 
 /// Options of reconstruct() of a set.
 struct MapOptions {
-  RegistrationOptions registration;
-  Options graph;  ///< threads 0: those of a CPU context
-  AuditOptions audit;
-  RefineOptions refinement;
+  RegistrationOptions registration = {};  ///< its voxel_size is that of all
+  Options graph = {};                     ///< threads 0: those of a CPU context
+  AuditOptions audit = {};
+  RefineOptions refinement = RefineOptions::for_depth_cameras();
   /// Ask the scans whether they contradict each other where the map puts them.
   bool with_audit = true;
   bool with_refinement = true;  ///< of all poses together
@@ -32,13 +32,8 @@ struct MapOptions {
   /// connects; 0: all pairs.
   std::uint32_t prune = 0;
   /// File from which an interrupted run goes on; empty: none.
-  std::string journal;
+  std::string journal = {};
   PairJournal::Mode journal_mode = PairJournal::Mode::resume;
-
-  /// Every length from the voxel size of the registration. Scans of depth cameras.
-  static MapOptions of(const RegistrationOptions& registration);
-  /// @throws InvalidArgument unless voxel_size is finite and > 0.
-  static MapOptions from_voxel_size(float voxel_size);
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

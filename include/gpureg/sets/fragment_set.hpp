@@ -38,7 +38,7 @@ class FragmentSet {
   /// Reads fragment k for a preparation by these options, of which meshes take the spacing of their
   /// samples. Called by several threads at a time.
   /// @throws IoError if it cannot be read.
-  virtual LoadedCloud read(std::size_t k, const PrepareOptions& options) const = 0;
+  virtual LoadedCloud read(std::size_t k, const RegistrationOptions& options) const = 0;
   /// Tells whether fragment k is the one that an earlier run saw. Called after it was read. By
   /// default fingerprint_of() the cloud, which reads it again.
   virtual std::string fingerprint(std::size_t k) const;
@@ -57,7 +57,7 @@ class FragmentsOf : public FragmentSet {
 
   std::size_t size() const override { return names_.size(); }
   std::string name(std::size_t k) const override { return names_[k]; }
-  LoadedCloud read(std::size_t k, const PrepareOptions&) const override {
+  LoadedCloud read(std::size_t k, const RegistrationOptions&) const override {
     return LoadedCloud(read_(k));
   }
 
@@ -91,7 +91,7 @@ struct SetCallbacks {
 /// @return one per fragment; fewer, if should_stop ended the call.
 /// @throws InvalidArgument for options out of range. DeviceError.
 std::vector<PreparedFragment> prepare_all(const Context& context, const FragmentSet& fragments,
-                                          const PrepareOptions& options = {},
+                                          const RegistrationOptions& options = {},
                                           const SetCallbacks& callbacks = {});
 
 }  // namespace gpureg

@@ -31,7 +31,7 @@ class ScanFiles : public FragmentSet {
   std::string label(std::size_t k) const override { return scans_[k].path; }
   int number(std::size_t k) const { return scans_[k].number; }  ///< as Redwood's files have it
 
-  LoadedCloud read(std::size_t k, const PrepareOptions& options) const override {
+  LoadedCloud read(std::size_t k, const RegistrationOptions& options) const override {
     const std::string& path = scans_[k].path;
     const double spacing = 0.5 * static_cast<double>(options.voxel_size);
     PointCloud cloud = io::is_mesh(path) ? io::sample_mesh(io::read_mesh(path), spacing)

@@ -12,7 +12,7 @@ int main() {
       source.emplace_back(x, y, z);
       target.emplace_back(y + 1, -x, z + 2);
     }
-  const auto options = gpureg::RegistrationOptions::from_voxel_size(0.05f);
+  const gpureg::RegistrationOptions options{0.05f};
   const auto result = gpureg::align(gpureg::Context::cpu(), gpureg::PointCloudView(source),
                                     gpureg::PointCloudView(target), options);
   std::cout << explain(result.reason) << "\n" << result.target_from_source.matrix() << "\n";

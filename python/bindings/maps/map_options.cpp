@@ -5,22 +5,6 @@
 #include "fields/loop_closure.hpp"
 
 namespace gpureg::python {
-namespace {
-
-template <typename T>
-py::class_<T> bind_scaled(py::module_& m) {
-  auto cls = bind_options_class<T>(m);
-  cls.def_static(
-      "from_voxel_size",
-      [](const py::object& voxel_size) {
-        return T::from_voxel_size(argument<float>(voxel_size, "voxel_size"));
-      },
-      py::arg("voxel_size"), "Every length from the voxel size (metres).");
-  return cls;
-}
-
-}  // namespace
-
 void bind_map_options(py::module_& m) {
   bind_options_class<pose_graph::GncOptions>(m);
   bind_options_class<pose_graph::LineProcessOptions>(m);
@@ -29,16 +13,16 @@ void bind_map_options(py::module_& m) {
   bind_options_class<pose_graph::SolverOptions>(m);
   bind_options_class<pose_graph::Options>(m);
   bind_options_class<reconstruction::EdgeNoiseOptions>(m);
-  bind_scaled<reconstruction::Options>(m);
-  bind_scaled<reconstruction::AuditOptions>(m);
+  bind_options_class<reconstruction::Options>(m);
+  bind_options_class<reconstruction::AuditOptions>(m);
   bind_options_class<loop_closure::ProposalOptions>(m);
   bind_options_class<loop_closure::AcceptanceOptions>(m);
-  bind_scaled<loop_closure::Options>(m).def_static(
+  bind_options_class<loop_closure::Options>(m).def_static(
       "loopsmart",
       [](const py::object& voxel_size) {
         return loop_closure::Options::loopsmart(argument<float>(voxel_size, "voxel_size"));
       },
-      py::arg("voxel_size") = shortest(PrepareOptions{}.voxel_size),
+      py::arg("voxel_size") = shortest(RegistrationOptions{}.voxel_size),
       "Verification by the constants of the LoopSmart paper.");
 }
 

@@ -13,7 +13,7 @@ namespace gpureg::python {
 /// A FragmentSet of Python. Any thread may use it, without Python's lock.
 class PythonSet : public FragmentSet {
  public:
-  /// load(k, PrepareOptions): the tuple of an Input on the host; OSError where there is none.
+  /// load(k, RegistrationOptions): the tuple of an Input on the host; OSError where there is none.
   PythonSet(std::vector<std::string> names, std::vector<std::string> fingerprints, py::object load)
       : names_(std::move(names)), fingerprints_(std::move(fingerprints)), load_(std::move(load)) {}
 
@@ -21,7 +21,7 @@ class PythonSet : public FragmentSet {
   std::string name(std::size_t k) const override { return names_[k]; }
   std::string label(std::size_t k) const override { return "fragments[" + std::to_string(k) + "]"; }
   std::string fingerprint(std::size_t k) const override { return fingerprints_.at(k); }
-  LoadedCloud read(std::size_t k, const PrepareOptions& options) const override;
+  LoadedCloud read(std::size_t k, const RegistrationOptions& options) const override;
 
  private:
   std::vector<std::string> names_, fingerprints_;

@@ -165,7 +165,7 @@ py::dict reconstruct_set(const Context& context, const PythonSet& set,
 MapOptions map_options(const RegistrationOptions& registration, const Options& graph,
                        const AuditOptions& audit, bool with_audit, bool with_refinement,
                        const std::string& journal) {
-  MapOptions options = MapOptions::of(registration);
+  MapOptions options{registration};
   options.graph = graph;
   options.audit = audit;
   options.with_audit = with_audit;

@@ -76,8 +76,8 @@ void bind_journal(py::module_& m) {
 }
 
 /// A list with a prepared cloud, or the reason why there is none, for each fragment.
-py::list prepare_set(const Context& context, const PythonSet& set, const PrepareOptions options,
-                     const py::object& progress) {
+py::list prepare_set(const Context& context, const PythonSet& set,
+                     const RegistrationOptions options, const py::object& progress) {
   Teller tell(progress);
   std::vector<PreparedFragment> prepared;
   tell.run([&] {
@@ -139,7 +139,7 @@ void warn_of_viewpoints(const PointCloudView& view, const std::string& label) {
 
 }  // namespace
 
-LoadedCloud PythonSet::read(std::size_t k, const PrepareOptions& options) const {
+LoadedCloud PythonSet::read(std::size_t k, const RegistrationOptions& options) const {
   const py::gil_scoped_acquire acquire;
   try {
     const std::shared_ptr<py::tuple> tuple(new py::tuple(load_(k, options)), [](py::tuple* held) {
@@ -149,7 +149,7 @@ LoadedCloud PythonSet::read(std::size_t k, const PrepareOptions& options) const 
     LoadedCloud cloud;
     cloud.view = Input(*tuple).view;
     cloud.owner = tuple;
-    if (options.depth_maps > 0) warn_of_viewpoints(cloud.view, label(k));
+    if (options.prepare.depth_maps > 0) warn_of_viewpoints(cloud.view, label(k));
     return cloud;
   } catch (const py::error_already_set& error) {
     if (!error.matches(PyExc_OSError)) throw;

@@ -117,7 +117,7 @@ class TestE57:
         names = [f"{path}#{k + 1}" for k in range(len(clouds))]
         fragments = gpureg.FragmentSet.from_clouds(names)
         assert len({fragments.fingerprint(k) for k in range(3)}) == 3
-        options = gpureg.RegistrationOptions(prepare=gpureg.PrepareOptions(voxel_size=0.1))
+        options = gpureg.RegistrationOptions(voxel_size=0.1)
         run = gpureg.register_all(names, output=tmp_path / "o", options=options, progress=False)
         assert run.log.read_text().count("\n") == 3 * 5  # all three pairs
 

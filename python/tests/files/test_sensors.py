@@ -47,7 +47,7 @@ class TestLas:
         points = np.random.default_rng(1).random((3000, 3)) * 10
         utm = points + [500000, 5400000, 300]
         path = self.write(laspy, str(tmp_path / name), utm)
-        cloud = gpureg.prepare(path, options=gpureg.PrepareOptions(voxel_size=0.5))
+        cloud = gpureg.prepare(path, options=gpureg.RegistrationOptions(voxel_size=0.5))
         assert cloud.statistics.input_points == 3000
         result = gpureg.register(path, points, voxel_size=0.5)
         assert result.aligned
@@ -126,13 +126,13 @@ class TestMesh:
     def test_faces_are_sampled(self):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            cloud = gpureg.prepare(mesh(), options=gpureg.PrepareOptions(voxel_size=0.05))
+            cloud = gpureg.prepare(mesh(), options=gpureg.RegistrationOptions(voxel_size=0.05))
         assert cloud.statistics.input_points == 20000
         outwards = (cloud.normals * (cloud.points - 0.5)).sum(axis=1)
         assert (outwards > 0).all()
 
     def test_half_a_voxel_apart(self):
-        cloud = gpureg.prepare(mesh(), options=gpureg.PrepareOptions(voxel_size=0.02))
+        cloud = gpureg.prepare(mesh(), options=gpureg.RegistrationOptions(voxel_size=0.02))
         assert cloud.statistics.input_points == pytest.approx(60000, abs=1)
 
     def test_open3d_names_them_triangles(self):

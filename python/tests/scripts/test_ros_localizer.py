@@ -19,7 +19,13 @@ from rosbags.typesys import Stores, get_typestore
 PACKAGE = pathlib.Path(__file__).resolve().parents[3] / "ros/gpureg_localizer"
 sys.path.insert(0, str(PACKAGE))
 
-from gpureg_localizer.localizer import Localizer, covariance_of, points_of, quaternion_of
+from gpureg_localizer.localizer import (
+    Localizer,
+    covariance_of,
+    noise_of,
+    points_of,
+    quaternion_of,
+)
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 CLOUD, FIELD = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointField"
@@ -180,10 +186,10 @@ def test_covariance_is_that_of_finite_differences():
 def test_covariance_is_that_of_a_map():
     """LoopCloser's information is of Log(pose^-1 truth), rotation first, in the source's frame."""
     frame = pose()
-    options = gpureg.LoopClosureOptions.from_voxel_size(0.05)
+    options = gpureg.LoopClosureOptions()
     context = gpureg.Context.cpu(1)
     target, source = (
-        gpureg.prepare(scan(1, at, k), options=options.registration.prepare, context=context)
+        gpureg.prepare(scan(1, at, k), options=options.registration, context=context)
         for k, at in enumerate((np.eye(4), frame))
     )
     result = gpureg.align(source, target, options=options.registration, context=context)
@@ -200,8 +206,7 @@ def test_covariance_is_that_of_a_map():
         result.target_from_source,
         result.modes[0].evidence,
         result.source_moments,
-        options.noise,
-        options.information_unit,
+        *noise_of(options, float(np.float32(0.05))),  # as in C++
     )
     # The inverse of a matrix with a condition of some thousands.
     assert np.abs(covariance - expected).max() < 1e-9 * np.abs(expected).max()

@@ -86,6 +86,15 @@ def _inflation(weak: float, typical: float, most: float) -> float:
     return max(1.0, typical / weak) if weak > typical / most else most
 
 
+def noise_of(options: Any, voxel_size: float) -> tuple[gpureg.EdgeNoiseOptions, float]:
+    """Noise of a registered pose and unit of rotations, of options in voxels, in metres."""
+    noise = options.noise.replace(
+        translation=options.noise.translation * voxel_size,
+        max_translation=options.noise.max_translation * voxel_size,
+    )
+    return noise, options.information_unit * voxel_size
+
+
 def covariance_of(
     target_from_source: FloatArray,
     evidence: gpureg.PoseEvidence,
@@ -164,8 +173,9 @@ class Localizer:
     def __init__(self, map: Any, *, context: gpureg.Context | None = None) -> None:
         self.map = map if isinstance(map, gpureg.PreparedMap) else gpureg.load_map(map)
         self._context = context
-        options = gpureg.ReconstructionOptions.from_voxel_size(self.map.options.prepare.voxel_size)
-        self._noise, self._unit = options.noise, options.information_unit
+        self._noise, self._unit = noise_of(
+            gpureg.ReconstructionOptions(), self.map.options.voxel_size
+        )
 
     def locate(self, message: Any) -> Location:
         """The pose of a sensor_msgs/PointCloud2 in the map.

@@ -32,19 +32,19 @@ class CpuEngine final : public Engine {
   const void* memory() const override { return &kHostMemory; }
   // Enough pairs to keep all threads busy at the end of a stage, few enough for prompt progress and
   // cancellation.
-  std::size_t pairs_per_chunk(const RegistrationOptions&) const override {
+  std::size_t pairs_per_chunk(const RegistrationSettings&) const override {
     return 2 * exec_.threads() + 2;
   }
 
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareOptions& options) override {
+                                                      const PrepareSettings& options) override {
     std::lock_guard<std::mutex> lock(mutex_);
     auto prepared = pipeline::prepare(exec_, clouds, options);
     for (auto& cloud : prepared) cloud->owner = &kHostMemory;
     return {prepared.begin(), prepared.end()};
   }
 
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+  void align(Span<const PairInput> pairs, const RegistrationSettings& options,
              Span<PairOutcome> outcomes) override {
     std::lock_guard<std::mutex> lock(mutex_);
     const std::vector<PairView> views = views_of(pairs);
@@ -55,7 +55,7 @@ class CpuEngine final : public Engine {
   }
 
   std::vector<FeatureMatches> match(Span<const PairInput> pairs,
-                                    const RegistrationOptions& options) override {
+                                    const RegistrationSettings& options) override {
     std::lock_guard<std::mutex> lock(mutex_);
     const std::vector<PairView> views = views_of(pairs);
     std::vector<FeatureMatches> out;
@@ -65,7 +65,7 @@ class CpuEngine final : public Engine {
   }
 
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
-              const RegistrationOptions& options, bool refine,
+              const RegistrationSettings& options, bool refine,
               Span<PairOutcome> outcomes) override {
     std::lock_guard<std::mutex> lock(mutex_);
     const std::vector<PairView> views = views_of(pairs);

@@ -121,7 +121,7 @@ void find_peaks(const MatchSet& m, const std::vector<std::uint32_t>& degrees,
 
 std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
                                                      const std::vector<MatchSet>& matches,
-                                                     const RegistrationOptions& options) {
+                                                     const RegistrationSettings& options) {
   const CompatibilityTest test = test_of(options.compatibility);
   const float squared_separation =
       options.compatibility.seed_separation * options.compatibility.seed_separation;

@@ -28,7 +28,7 @@ struct MatchColumns {
   }
 };
 
-inline CompatibilityTest test_of(const CompatibilityOptions& options) {
+inline CompatibilityTest test_of(const CompatibilitySettings& options) {
   return compatibility_test(options.tolerance, options.max_turn);
 }
 

@@ -23,7 +23,7 @@ struct Search {
   std::vector<std::uint32_t> places = {};  ///< of the queries in their index
 };
 
-std::vector<Search> searches_of(const PairView& pair, const RegistrationOptions& options) {
+std::vector<Search> searches_of(const PairView& pair, const RegistrationSettings& options) {
   std::vector<Search> out;
   const CloudView &s = pair.source, &t = pair.target;
   if (pair.custom_count > 0 || s.size == 0 || t.size == 0) return out;
@@ -154,7 +154,7 @@ MatchSet merge(const PairView& pair, const std::vector<Search>& searches, std::u
 }  // namespace
 
 std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
-                                    const RegistrationOptions& options) {
+                                    const RegistrationSettings& options) {
   std::vector<std::vector<Search>> searches(pairs.size);
   std::vector<Search*> flat;
   for (std::size_t p = 0; p < pairs.size; ++p) {

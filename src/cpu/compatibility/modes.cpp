@@ -11,7 +11,7 @@ namespace {
 
 /// Normal equations from the points of the walk, with normal-space weights.
 IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& pose,
-                  const RegistrationOptions& options, float kernel_width, float min_cosine) {
+                  const RegistrationSettings& options, float kernel_width, float min_cosine) {
   const Rigid rigid = to_rigid(pose);
   const CloudView &s = pair.source, &t = pair.target;
   const float max_squared =
@@ -31,7 +31,7 @@ IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& 
 
 /// Iterates until it settles, at most max_iterations times.
 void refine_mode(MovedPoints& moved, const PairView& pair, std::uint32_t max_iterations,
-                 const RegistrationOptions& options, float kernel_width, double settled,
+                 const RegistrationSettings& options, float kernel_width, double settled,
                  float min_cosine, Mode& mode) {
   for (std::uint32_t k = 0; k < max_iterations; ++k) {
     const IcpStep step =
@@ -48,7 +48,7 @@ void refine_mode(MovedPoints& moved, const PairView& pair, std::uint32_t max_ite
 /// One refinement of all modes. order_of(p): the points of pair p that take part.
 template <typename OrderOf>
 void refine_each(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                 std::uint32_t max_iterations, const RegistrationOptions& options,
+                 std::uint32_t max_iterations, const RegistrationSettings& options,
                  float kernel_width, double settled, const OrderOf& order_of) {
   const float min_cosine =
       inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine;
@@ -64,7 +64,7 @@ void refine_each(Exec& exec, Span<const PairView> pairs, std::vector<std::vector
 
 /// On a sample of each source.
 void refine_sample(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                   std::uint32_t max_iterations, const RegistrationOptions& options,
+                   std::uint32_t max_iterations, const RegistrationSettings& options,
                    float kernel_width, double settled) {
   std::vector<ScoringOrder> sample(pairs.size);
   exec.parallel(pairs.size, [&](std::size_t p) {
@@ -108,7 +108,7 @@ std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candid
 
 std::vector<Candidates> candidates_from_modes(Exec& exec, const std::vector<MatchSet>& matches,
                                               const std::vector<std::vector<Mode>>& modes,
-                                              const RegistrationOptions& options) {
+                                              const RegistrationSettings& options) {
   const float squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
   std::vector<Candidates> out(modes.size());
@@ -124,13 +124,13 @@ std::vector<Candidates> candidates_from_modes(Exec& exec, const std::vector<Matc
 }
 
 void refine_roughly(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                    const RegistrationOptions& options) {
+                    const RegistrationSettings& options) {
   refine_sample(exec, pairs, modes, std::min(kRoughIterations, options.refine.max_iterations),
                 options, options.refine.kernel_width, kRoughSettled);
 }
 
 void polish_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                  const RegistrationOptions& options) {
+                  const RegistrationSettings& options) {
   const float kernel_width = kPolishKernel * options.refine.kernel_width;
   refine_sample(exec, pairs, modes, options.refine.max_iterations, options, kernel_width,
                 kPolishSettled);
@@ -141,7 +141,7 @@ void polish_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vecto
 }
 
 void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
-                 const RegistrationOptions& options, float share) {
+                 const RegistrationSettings& options, float share) {
   const ModeLimits within =
       mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, share);
   exec.parallel(modes.size(), [&](std::size_t p) {

@@ -115,7 +115,7 @@ GPUREG_ALWAYS_INLINE bool refit(const Members& members, float squared_distance, 
 /// to its consensus set.
 template <typename Mask>
 GPUREG_ALWAYS_INLINE bool fit_seed_in_vectors(const MatchSet& m, std::uint32_t seed,
-                                              const CompatibilityOptions& options,
+                                              const CompatibilitySettings& options,
                                               std::uint64_t random, Members& members,
                                               Pose<float>& pose) {
   const CompatibilityTest test = test_of(options);
@@ -170,13 +170,13 @@ GPUREG_ALWAYS_INLINE bool fit_seed_in_vectors(const MatchSet& m, std::uint32_t s
 
 #ifdef GPUREG_WIDE_TARGET
 GPUREG_WIDE_TARGET bool fit_seed_wide(const MatchSet& m, std::uint32_t seed,
-                                      const CompatibilityOptions& options, std::uint64_t random,
+                                      const CompatibilitySettings& options, std::uint64_t random,
                                       Members& members, Pose<float>& pose) {
   return fit_seed_in_vectors<WideMask>(m, seed, options, random, members, pose);
 }
 #endif
 
-bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions& options,
+bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilitySettings& options,
               std::uint64_t random, Members& members, Pose<float>& pose) {
 #ifdef GPUREG_WIDE_TARGET
   if (has_wide_vectors()) return fit_seed_wide(m, seed, options, random, members, pose);
@@ -229,7 +229,7 @@ MatchEvidence count_matches(const MatchSet& m, const Rigid& pose, float squared_
 
 std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches,
                                       const std::vector<std::vector<std::uint32_t>>& seeds,
-                                      const RegistrationOptions& options) {
+                                      const RegistrationSettings& options) {
   std::vector<Candidates> all(matches.size());
   std::vector<std::vector<std::uint8_t>> valid(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p) {

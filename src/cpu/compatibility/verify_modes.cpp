@@ -11,7 +11,7 @@ namespace gpureg::cpu {
 namespace {
 
 /// True where the summaries may confirm inliers; otherwise they only refute.
-bool decides(const RegistrationOptions& options) {
+bool decides(const RegistrationSettings& options) {
   return options.evidence.max_normal_angle <= 90.0f;
 }
 
@@ -148,7 +148,7 @@ SideEvidence verify_side(MovedPoints& points, const Side& side, const Rigid& pos
 }  // namespace
 
 void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
-                      std::vector<Candidates>& candidates, const RegistrationOptions& options) {
+                      std::vector<Candidates>& candidates, const RegistrationSettings& options) {
   const EvidenceTest test = pipeline::evidence_test(options);
   const SummaryLimits exact(options.evidence.max_normal_angle, true),
       inexact(options.evidence.max_normal_angle, false);
@@ -188,7 +188,7 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<
 
 void verify_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
                   const std::vector<Candidates>& candidates,
-                  const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options,
+                  const std::vector<std::vector<Mode>>& modes, const RegistrationSettings& options,
                   Span<PairOutcome> outcomes) {
   const EvidenceTest test = pipeline::evidence_test(options);
   const SummaryLimits limits(options.evidence.max_normal_angle, false);

@@ -43,7 +43,7 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(
     Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
     std::vector<Features>& features, std::vector<Features>& wide_features,
     std::vector<std::shared_ptr<const ClosestGrid>>& closest, std::vector<Visibility>& visibility,
-    std::vector<SurfaceSides>& surface_sides, const PrepareOptions& options) {
+    std::vector<SurfaceSides>& surface_sides, const PrepareSettings& options) {
   std::vector<std::shared_ptr<CpuCloud>> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     auto cloud = std::make_shared<CpuCloud>();

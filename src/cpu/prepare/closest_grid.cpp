@@ -276,7 +276,7 @@ ClosestGridView ClosestGrid::view() const {
 
 std::vector<std::shared_ptr<const ClosestGrid>> build_closest_grids(
     Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
-    const PrepareOptions& options) {
+    const PrepareSettings& options) {
   std::vector<std::shared_ptr<const ClosestGrid>> out(clouds.size());
   std::vector<GrowingGrid> growing(clouds.size());
   // Both sides of a cloud come one after the other, and the grid knows no sides.

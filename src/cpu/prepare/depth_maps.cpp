@@ -15,7 +15,7 @@ void erode(std::uint16_t* map) {
 
 std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw,
                                          const std::vector<DownsampledCloud>& clouds,
-                                         const PrepareOptions& options) {
+                                         const PrepareSettings& options) {
   std::vector<Visibility> out(clouds.size());
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     const std::size_t known = clouds[c].points.empty() ? 0 : clouds[c].viewpoints.size();

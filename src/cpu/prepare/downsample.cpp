@@ -39,7 +39,7 @@ void find_origin(const RawCloud& raw, float voxel_size, DownsampledCloud& out,
   out.lo = Vec3{lo[0], lo[1], lo[2]} - origin, out.hi = Vec3{hi[0], hi[1], hi[2]} - origin;
 }
 
-void downsample_one(const RawCloud& raw, const PrepareOptions& options, DownsampledCloud& out) {
+void downsample_one(const RawCloud& raw, const PrepareSettings& options, DownsampledCloud& out) {
   std::vector<std::uint32_t> finite;
   find_origin(raw, options.voxel_size, out, finite);
   const Vec3 origin{out.origin[0], out.origin[1], out.origin[2]};
@@ -97,7 +97,7 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
 }  // namespace
 
 std::vector<DownsampledCloud> downsample(Exec& exec, Span<const RawCloud> clouds,
-                                         const PrepareOptions& options) {
+                                         const PrepareSettings& options) {
   std::vector<DownsampledCloud> out(clouds.size);
   exec.parallel(clouds.size, [&](std::size_t k) { downsample_one(clouds[k], options, out[k]); });
   return out;

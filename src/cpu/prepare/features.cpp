@@ -111,7 +111,7 @@ void describe(Exec& exec, const std::vector<DownsampledCloud>& clouds,
 
 std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
                                             const std::vector<Grid>& grids,
-                                            const PrepareOptions& options) {
+                                            const PrepareSettings& options) {
   std::vector<Features> features(clouds.size());
   const bool any = std::any_of(clouds.begin(), clouds.end(), [](const DownsampledCloud& cloud) {
     return cloud.feature_dimension == 0;
@@ -128,7 +128,7 @@ std::vector<Features> compute_wide_features(Exec& exec, const std::vector<Downsa
 std::vector<Features> compute_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
                                        const std::vector<std::vector<Vec3>>& normals,
                                        const std::vector<Grid>& grids,
-                                       const PrepareOptions& options) {
+                                       const PrepareSettings& options) {
   std::vector<Features> features(clouds.size());
   // Given features are copied; rows with a NaN are never matched.
   for (std::size_t c = 0; c < clouds.size(); ++c) {

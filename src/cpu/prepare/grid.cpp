@@ -37,7 +37,7 @@ double squared_cell_sizes(const Grid& grid) {
 }  // namespace
 
 std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds,
-                              const PrepareOptions& options) {
+                              const PrepareSettings& options) {
   std::vector<Grid> grids(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     Grid& grid = grids[c];

@@ -7,7 +7,7 @@ namespace gpureg::cpu {
 std::vector<SurfaceSides> build_surface_sides(Exec& exec,
                                               const std::vector<DownsampledCloud>& clouds,
                                               const std::vector<std::vector<Vec3>>& normals,
-                                              const PrepareOptions& options) {
+                                              const PrepareSettings& options) {
   std::vector<SurfaceSides> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     const std::vector<Vec3>& points = clouds[c].points;

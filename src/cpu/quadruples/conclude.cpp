@@ -8,7 +8,7 @@ namespace gpureg::cpu {
 void conclude(Exec&, Span<const PairView> pairs, const std::vector<Matches>& matches,
               const std::vector<std::vector<std::uint32_t>>& quadruples,
               const std::vector<Hypotheses>& hypotheses, const std::vector<BestPose>& poses,
-              const std::vector<Verification>& verifications, const RegistrationOptions& options,
+              const std::vector<Verification>& verifications, const RegistrationSettings& options,
               Span<PairOutcome> outcomes) {
   for (std::size_t p = 0; p < pairs.size; ++p) {
     const std::uint32_t found = static_cast<std::uint32_t>(matches[p].pairs.size());

@@ -7,7 +7,7 @@ namespace gpureg::cpu {
 
 std::vector<Hypotheses> fit_hypotheses(Exec& exec, const std::vector<Matches>& matches,
                                        const std::vector<std::vector<std::uint32_t>>& quadruples,
-                                       const RegistrationOptions& options) {
+                                       const RegistrationSettings& options) {
   std::vector<std::vector<Pose<float>>> poses(matches.size());
   std::vector<std::vector<std::uint8_t>> valid(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p) {

@@ -132,7 +132,7 @@ void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, st
 }
 
 std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
-                                    const RegistrationOptions& options) {
+                                    const RegistrationSettings& options) {
   const std::uint32_t k = options.quadruples.neighbors;
   std::vector<std::vector<float>> forward_blocks(pairs.size), backward_blocks(pairs.size);
   std::vector<std::vector<std::uint32_t>> forward(pairs.size), backward(pairs.size);

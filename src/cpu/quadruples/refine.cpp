@@ -11,7 +11,7 @@ namespace {
 /// Normal equations over all source points with a closest target point within distance and normal
 /// angle.
 IcpSums icp_sums(Exec& exec, const PairView& pair, const Pose<double>& pose,
-                 const RegistrationOptions& options, float min_cosine) {
+                 const RegistrationSettings& options, float min_cosine) {
   constexpr std::size_t kGrain = 1024;
   const Rigid rigid = to_rigid(pose);
   const float max_squared =
@@ -45,7 +45,7 @@ IcpSums icp_sums(Exec& exec, const PairView& pair, const Pose<double>& pose,
 
 std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
                                    const std::vector<BestPose>& best,
-                                   const RegistrationOptions& options) {
+                                   const RegistrationSettings& options) {
   std::vector<BestPose> out = best;
   if (options.refine.max_iterations == 0) return out;
   const float min_cosine =

@@ -99,7 +99,7 @@ unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kDrawnT
 
 std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
                                                           const std::vector<Matches>& matches,
-                                                          const RegistrationOptions& options) {
+                                                          const RegistrationSettings& options) {
   const std::uint32_t blocks =
       (options.quadruples.count + kHypothesesPerTask - 1) / kHypothesesPerTask;
   std::vector<std::vector<std::vector<std::uint32_t>>> parts(matches.size());

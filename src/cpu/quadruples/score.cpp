@@ -157,7 +157,7 @@ class PairScorer {
 }  // namespace
 
 Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose,
-                        const RegistrationOptions& options) {
+                        const RegistrationSettings& options) {
   const InlierTest test =
       inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle);
   Support s{0, 0, 0};
@@ -167,7 +167,7 @@ Support measure_support(const CloudView& source, const CloudView& target, const 
 
 std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
                                        const std::vector<Hypotheses>& hypotheses,
-                                       const RegistrationOptions& options) {
+                                       const RegistrationSettings& options) {
   constexpr std::size_t kGrain = 256;
   const InlierTest test =
       inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle);

@@ -6,7 +6,7 @@ namespace gpureg::cpu {
 
 std::vector<Verification> verify_poses(Exec& exec, Span<const PairView> pairs,
                                        const std::vector<BestPose>& poses,
-                                       const RegistrationOptions& options) {
+                                       const RegistrationSettings& options) {
   const InlierTest test = inlier_test(options.prepare.max_correspondence_distance,
                                       options.quadruples.max_verification_normal_angle);
   std::vector<Verification> out(pairs.size);

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "common/without_features.hpp"
+#include "fields/in_units.hpp"
+#include "fields/localization.hpp"
 #include "localization/candidates.hpp"
 #include "localization/change/changed_points.hpp"
 #include "localization/check_scan.hpp"
@@ -39,8 +41,7 @@ void refine(const Context& context, const PointCloudView& scan, const MapState& 
   const PointCloud around =
       neighborhood(map, in_frame(surface), scene.map_from_scan, kNeighborhoodVoxels * voxel);
   if (around.points.empty()) return;
-  const RegistrationOptions options =
-      RegistrationOptions::from_voxel_size(map.options.prepare.voxel_size);
+  const RegistrationSettings options = gpureg::resolve(RegistrationOptions{map.given.voxel_size});
   const PreparedCloud source = prepare(context, scan, map.options.prepare),
                       target = prepare(context, views_of({around}).front(),
                                        as_they_are(map.options.prepare));
@@ -132,7 +133,7 @@ void estimate_normals(const Context& context, const MapState& map, Surface& surf
   const WithoutFeatures without(surface.points.size());
   PointCloudView view = without.of(PointCloudView(surface.points));
   view.infer_viewpoint = false;
-  PrepareOptions options = as_they_are(map.options.prepare);
+  PrepareSettings options = as_they_are(map.options.prepare);
   options.depth_maps = 0;
   options.surface_side_distance = 0;
   options.wide_feature_radius = 0;
@@ -224,9 +225,10 @@ const char* to_string(ChangeLabel label) {
 
 ChangeResult find_changes(const Context& context, const PointCloudView& scan,
                           const PreparedMap& map, const UnalignedIsometry3d& map_from_scan,
-                          const ChangeOptions& options) {
+                          const ChangeOptions& given) {
   const MapState& state = MapState::of(map);
-  options.validate();
+  given.validate();
+  const ChangeOptions options = fields::in_units(given, state.given.voxel_size);
   scan.validate();
   check_place(map_from_scan);
   check_unit(scan, state, "scan");
@@ -248,12 +250,6 @@ ChangeResult find_changes(const Context& context, const PointCloudView& scan,
   out.map = all_of(changed_points(of_map, scene.scan, options.min_extent, host_threads(context)),
                    scene.numbers, state.points.size(), 1);
   return out;
-}
-
-ChangeResult find_changes(const Context& context, const PointCloudView& scan,
-                          const PreparedMap& map, const UnalignedIsometry3d& map_from_scan) {
-  return find_changes(context, scan, map, map_from_scan,
-                      ChangeOptions::from_voxel_size(map.options().prepare.voxel_size));
 }
 
 }  // namespace gpureg::localization

@@ -69,7 +69,7 @@ Box box_of(const PointCloudView& cloud) {
 /// Normals without features, as evidence needs them.
 PreparedCloud prepared_surface(const Context& context, const PointCloudView& cloud, float voxel,
                                bool keep_viewpoints) {
-  PrepareOptions options = RegistrationOptions::from_voxel_size(voxel).prepare;
+  PrepareSettings options = resolve(PrepareOptions{}, voxel);
   options.surface_side_distance = 0;
   options.wide_feature_radius = 0;
   options.depth_maps = keep_viewpoints ? 1 : 0;
@@ -128,7 +128,7 @@ std::vector<Eigen::Vector3f> thinned(const PointCloudView& scene, float voxel) {
 struct PartSearch {
   const Context& context;
   const PreparedCloud& part;
-  const RegistrationOptions& registration;
+  const RegistrationSettings& registration;
   const PartVerifier& verifier;
   const SceneSurface& surface;
   double diameter;
@@ -265,11 +265,10 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
       {static_cast<double>(out.voxel_size) / 2, kFineSpacings * spacing, kPartSpacings * of_part}));
 
   // The search.
-  RegistrationOptions registration =
-      RegistrationOptions::from_voxel_size(out.voxel_size, options.quality);
+  RegistrationSettings registration = resolve(RegistrationOptions{out.voxel_size, options.quality});
   registration.seed = options.seed;
   PreparedCloud part_cloud = prepare(context, outer.view(), registration.prepare);
-  PrepareOptions of_scene = registration.prepare;
+  PrepareSettings of_scene = registration.prepare;
   of_scene.surface_side_distance = 0;
   of_scene.wide_feature_radius = 0;
   of_scene.keep_range_limits = true;

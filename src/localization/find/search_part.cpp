@@ -80,12 +80,12 @@ std::vector<std::uint32_t> middles_of_pieces(const std::vector<Eigen::Vector3f>&
 
 std::vector<PartCandidate> search_pieces(const Context& context, const PreparedCloud& part,
                                          const SearchedScene& scene, const PieceSizes& sizes,
-                                         const RegistrationOptions& options, std::size_t& pieces) {
+                                         const RegistrationSettings& options, std::size_t& pieces) {
   const PieceCells cells(scene.points, static_cast<float>(sizes.radius));
   std::vector<PointCloud> clouds;
   std::size_t points = 0;
   std::vector<PartCandidate> out;
-  PrepareOptions prepare = options.prepare;
+  PrepareSettings prepare = options.prepare;
   prepare.voxel_size = 0;
   prepare.keep_range_limits = true;
   const auto align_those = [&] {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "gpureg/registration.hpp"
+#include "api/with_settings.hpp"
 
 namespace gpureg::localization {
 
@@ -33,6 +33,6 @@ std::vector<std::uint32_t> middles_of_pieces(const std::vector<Eigen::Vector3f>&
 /// @param pieces their number, for the result.
 std::vector<PartCandidate> search_pieces(const Context& context, const PreparedCloud& part,
                                          const SearchedScene& scene, const PieceSizes& sizes,
-                                         const RegistrationOptions& options, std::size_t& pieces);
+                                         const RegistrationSettings& options, std::size_t& pieces);
 
 }  // namespace gpureg::localization

@@ -231,7 +231,7 @@ std::vector<Candidate> candidates_of(const MapState& map, const FloorPlan& plan,
         candidate.mode = out.size();
         if (!contradicts(scan, candidate.map_from_scan)) out.push_back(candidate);
       }
-  EvidenceOptions near;  // of two places
+  EvidenceSettings near;  // of two places
   near.mode_distance = 2 * plan.cell;
   out = distinct(std::move(out), scan.middle, near, most + 1);
   rate(out);

@@ -11,13 +11,14 @@
 #include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "fields/audit.hpp"
-#include "fields/scale.hpp"
+#include "fields/in_units.hpp"
 #include "fields/validate.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/companions.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
+#include "reconstruction/audit/in_units.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
 #include "reconstruction/audit/pair_verdicts.hpp"
 #include "reconstruction/audit/path.hpp"
@@ -214,65 +215,6 @@ void add_ruled_out(const std::vector<Edge>& ruled_out, Reconstruction& map) {
                    [](const Edge& a, const Edge& b) { return a.pair < b.pair; });
 }
 
-/// reconstruct(), within its should_stop.
-AuditedReconstruction reconstruct_and_audit(const Context& context,
-                                            const std::vector<PreparedCloud>& clouds,
-                                            const std::vector<Pair>& pairs,
-                                            const std::vector<RegistrationResult>& results,
-                                            Options options, const std::vector<Odometry>& odometry,
-                                            const RegistrationOptions& registration,
-                                            const AuditOptions& audit_options) {
-  audit_options.validate();
-  AuditedReconstruction out;
-  std::vector<RegistrationResult> left = with_likely_modes(results, options);
-  std::vector<Edge> ruled_out;
-  const std::vector<Eigen::Vector3d> sensors = sensors_of(clouds);
-  out.places_look_alike =
-      odometry.empty() &&
-      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, left, options), sensors, pairs,
-                        left);
-  bool heard_alone = false;
-  if (out.places_look_alike) {
-    if (const auto trusted = pairs_along_the_path(sensors, pairs, left, options)) {
-      ruled_out = keep_to_the_path(*trusted, pairs, options, left);
-    } else {
-      hear_each_pair_alone(left, options);
-      heard_alone = true;
-    }
-  }
-  hear_companions(context, clouds, pairs, registration, audit_options, left);
-  for (int round = 0;; ++round) {
-    out.map = reconstruct_from_poses(clouds.size(), pairs, left, options, odometry);
-    out.audit = audit_of(context, clouds, out.map, registration, audit_options, out.audit);
-    bool changed = false;
-    // The worst connection of each island: others may be contradicted because of it.
-    std::set<std::uint32_t> judged;
-    for (const AuditedConnection& connection : out.audit.connections) {
-      if (round == kMostRounds || connection.verdict != ConnectionVerdict::contradicted) break;
-      const std::vector<std::uint32_t> part = out.audit.scans_of(connection);
-      if (held_by_odometry(part, odometry) ||
-          !judged.insert(out.map.scans[part.front()].island).second)
-        continue;
-      for (const Edge& edge : out.map.edges) {
-        if (!edge.accepted || !divides(part, edge.source, edge.target)) continue;
-        rule_out(edge, left);
-        ruled_out.push_back(edge);
-        ruled_out.back().accepted = false;
-        ruled_out.back().weight = 0;
-        ruled_out.back().reason = EdgeReason::inconsistent;
-        changed = true;
-      }
-    }
-    if (!changed) break;
-  }
-  add_ruled_out(ruled_out, out.map);
-  judge_edges(out.audit, audit_options, out.places_look_alike, out.map);
-  if (heard_alone)
-    for (Edge& edge : out.map.edges)
-      edge.map_confidence = std::min(edge.map_confidence, edge.confidence);
-  return out;
-}
-
 }  // namespace
 
 const char* to_string(PairVerdict verdict) {
@@ -311,14 +253,13 @@ const char* to_string(AuditVerdict verdict) {
   return "unknown";
 }
 
-AuditOptions AuditOptions::from_voxel_size(float voxel_size) {
-  require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
-  AuditOptions options;
-  const double factor = static_cast<double>(voxel_size) / fields::kDefaultVoxel;
-  fields::scale(options, voxel_size);
+AuditOptions in_units(const AuditOptions& options, float voxel_size) {
+  options.validate();
+  AuditOptions out = fields::in_units(options, voxel_size);
+  const double factor = static_cast<double>(voxel_size) / 0.05;
   // Coarse voxels suit large scenes, not worse sensors: ICP places LiDAR scans to decimetres.
-  if (factor > 1) options.max_shift /= std::sqrt(factor * std::sqrt(factor));
-  return options;
+  if (factor > 1) out.max_shift /= std::sqrt(factor * std::sqrt(factor));
+  return out;
 }
 
 void AuditOptions::validate() const {
@@ -374,6 +315,69 @@ std::size_t Audit::count(ConnectionVerdict verdict) const {
       [&](const AuditedConnection& connection) { return connection.verdict == verdict; }));
 }
 
+AuditedReconstruction reconstruct_in_units(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
+    const Options& given, const std::vector<Odometry>& odometry,
+    const RegistrationOptions& registration, const AuditOptions& audit_options) {
+  Options options = given;
+  options.voxel_size = registration.voxel_size;
+  AuditedReconstruction out;
+  std::vector<RegistrationResult> left = with_likely_modes(results, options);
+  std::vector<Edge> ruled_out;
+  const std::vector<Eigen::Vector3d> sensors = sensors_of(clouds);
+  out.places_look_alike =
+      odometry.empty() &&
+      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, left, options), sensors, pairs,
+                        left);
+  bool heard_alone = false;
+  if (out.places_look_alike) {
+    if (const auto trusted = pairs_along_the_path(sensors, pairs, left, options)) {
+      ruled_out = keep_to_the_path(*trusted, pairs, options, left);
+    } else {
+      hear_each_pair_alone(left, options);
+      heard_alone = true;
+    }
+  }
+  hear_companions(context, clouds, pairs, registration, audit_options, left);
+  for (int round = 0;; ++round) {
+    out.map = reconstruct_from_poses(clouds.size(), pairs, left, options, odometry);
+    out.audit = audit_of(context, clouds, out.map, registration, audit_options, out.audit);
+    bool changed = false;
+    // The worst connection of each island: others may be contradicted because of it.
+    std::set<std::uint32_t> judged;
+    for (const AuditedConnection& connection : out.audit.connections) {
+      if (round == kMostRounds || connection.verdict != ConnectionVerdict::contradicted) break;
+      const std::vector<std::uint32_t> part = out.audit.scans_of(connection);
+      if (held_by_odometry(part, odometry) ||
+          !judged.insert(out.map.scans[part.front()].island).second)
+        continue;
+      for (const Edge& edge : out.map.edges) {
+        if (!edge.accepted || !divides(part, edge.source, edge.target)) continue;
+        rule_out(edge, left);
+        ruled_out.push_back(edge);
+        ruled_out.back().accepted = false;
+        ruled_out.back().weight = 0;
+        ruled_out.back().reason = EdgeReason::inconsistent;
+        changed = true;
+      }
+    }
+    if (!changed) break;
+  }
+  add_ruled_out(ruled_out, out.map);
+  judge_edges(out.audit, audit_options, out.places_look_alike, out.map);
+  if (heard_alone)
+    for (Edge& edge : out.map.edges)
+      edge.map_confidence = std::min(edge.map_confidence, edge.confidence);
+  return out;
+}
+
+Audit audit_in_units(const Context& context, const std::vector<PreparedCloud>& clouds,
+                     const Reconstruction& map, const RegistrationOptions& registration,
+                     const AuditOptions& options) {
+  return audit_of(context, clouds, map, registration, options, {});
+}
+
 Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
             const std::vector<UnalignedIsometry3d>& world_from_scan,
             const RegistrationOptions& registration, const AuditOptions& options) {
@@ -383,8 +387,9 @@ Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
 Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
             const Reconstruction& map, const RegistrationOptions& registration,
             const AuditOptions& options) {
+  const AuditOptions lengths = in_units(options, registration.voxel_size);
   return stoppable(options,
-                   [&] { return audit_of(context, clouds, map, registration, options, {}); });
+                   [&] { return audit_in_units(context, clouds, map, registration, lengths); });
 }
 
 AuditedReconstruction reconstruct(const Context& context, const std::vector<PreparedCloud>& clouds,
@@ -393,9 +398,10 @@ AuditedReconstruction reconstruct(const Context& context, const std::vector<Prep
                                   const Options& options, const std::vector<Odometry>& odometry,
                                   const RegistrationOptions& registration,
                                   const AuditOptions& audit_options) {
+  const AuditOptions lengths = in_units(audit_options, registration.voxel_size);
   return stoppable(audit_options, [&] {
-    return reconstruct_and_audit(context, clouds, pairs, results, options, odometry, registration,
-                                 audit_options);
+    return reconstruct_in_units(context, clouds, pairs, results, options, odometry, registration,
+                                lengths);
   });
 }
 

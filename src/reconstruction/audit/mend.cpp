@@ -7,8 +7,11 @@
 #include <set>
 #include <string>
 
+#include "fields/in_units.hpp"
+#include "fields/reconstruction.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "reconstruction/audit/in_units.hpp"
 #include "reconstruction/audit/joins.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
 #include "reconstruction/audit/parts.hpp"
@@ -125,7 +128,8 @@ MendedMap put_together(const Context& context, const std::vector<PreparedCloud>&
   out.world_from_scan = poses;
   Parts parts = parts_without_few(context, clouds, poses, found, registration, options);
   if (parts.empty()) parts = parts_of(poses, found);
-  const auto reconstruction = Options::from_voxel_size(registration.prepare.voxel_size);
+  const Options reconstruction{registration.voxel_size},
+      lengths = fields::in_units(reconstruction, reconstruction.voxel_size);
   std::vector<Pair> pairs, more = pairs_to_align(parts, found);
   std::vector<RegistrationResult> results;
   std::vector<Odometry> odometry = held(poses, parts);
@@ -134,15 +138,14 @@ MendedMap put_together(const Context& context, const std::vector<PreparedCloud>&
     std::vector<RegistrationResult> aligned = align_batch(context, clouds, more, registration);
     pairs.insert(pairs.end(), more.begin(), more.end());
     std::move(aligned.begin(), aligned.end(), std::back_inserter(results));
-    AuditedReconstruction again = reconstruct(context, clouds, pairs, results, reconstruction,
-                                              odometry, registration, options);
-    const std::vector<Odometry> joins =
-        confirmed_joins(context, clouds, pairs, results, found.pairs, again.map, reconstruction,
-                        registration, options);
+    AuditedReconstruction again = reconstruct_in_units(
+        context, clouds, pairs, results, reconstruction, odometry, registration, options);
+    const std::vector<Odometry> joins = confirmed_joins(
+        context, clouds, pairs, results, found.pairs, again.map, lengths, registration, options);
     if (!joins.empty()) {
       odometry.insert(odometry.end(), joins.begin(), joins.end());
-      again = reconstruct(context, clouds, pairs, results, reconstruction, odometry, registration,
-                          options);
+      again = reconstruct_in_units(context, clouds, pairs, results, reconstruction, odometry,
+                                   registration, options);
     }
     place(again.map, poses, out);
     more = pairs_between(clouds, parts, out.world_from_scan, pairs, kPairsOfScan);
@@ -184,8 +187,8 @@ void leave_out_contradicted(const Context& context, const std::vector<PreparedCl
                             const RegistrationOptions& registration, const AuditOptions& options,
                             MendedMap& map) {
   for (;;) {
-    map.audit =
-        audit(context, clouds, map_of_poses(map.world_from_scan, islands), registration, options);
+    map.audit = audit_in_units(context, clouds, map_of_poses(map.world_from_scan, islands),
+                               registration, options);
     if (map.audit.verdict() != AuditVerdict::contradicted) return;
     // The worst connection: others may be contradicted because of it.
     for (const std::uint32_t scan : map.audit.scans_of(map.audit.connections.front()))
@@ -227,8 +230,8 @@ MendedMap mend_islands(const Context& context, const std::vector<PreparedCloud>&
 
 MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
                const Reconstruction& map, const Audit& found,
-               const RegistrationOptions& registration, const AuditOptions& options) {
-  options.validate();
+               const RegistrationOptions& registration, const AuditOptions& given) {
+  const AuditOptions options = in_units(given, registration.voxel_size);
   if (map.scans.size() != clouds.size())
     throw InvalidArgument("world_from_scan has " + std::to_string(map.scans.size()) +
                           " entries, expected one per cloud, " + std::to_string(clouds.size()));

@@ -8,6 +8,8 @@
 #include <string>
 #include <tuple>
 
+#include "reconstruction/audit/in_units.hpp"
+
 namespace gpureg::reconstruction {
 namespace {
 
@@ -169,7 +171,7 @@ Parts parts_without_few(const Context& context, const std::vector<PreparedCloud>
     return {};
   std::vector<UnalignedIsometry3d> rest = poses;
   for (const std::uint32_t scan : few) rest[scan] = no_pose();
-  const Audit left = audit(context, clouds, rest, registration, options);
+  const Audit left = audit_in_units(context, clouds, map_of_poses(rest), registration, options);
   if (left.verdict() == AuditVerdict::contradicted ||
       left.count(ConnectionVerdict::undecided) > found.count(ConnectionVerdict::undecided))
     return {};

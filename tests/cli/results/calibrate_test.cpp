@@ -197,11 +197,11 @@ TEST_F(CalibrateVerb, PromisesARiskForFurtherScenes) {
   self["clouds"].erase(0);
   refused({self}, {folder_.path(), "other_0.json", "9 clouds in common"});
   json other = scene(1);
-  other["options"]["prepare"]["voxel_size"] = 0.2;
+  other["options"]["voxel_size"] = 0.2;
   refused({other}, {"other_0.json", "another --voxel-size"});
   other = scene(1);
-  other["options"]["evidence"].erase("sample");
-  refused({other}, {"another evidence.sample"});
+  other["options"]["prepare"].erase("depth_maps");
+  refused({other}, {"another prepare.depth_maps"});
 }
 
 TEST_F(CalibrateVerb, TooFewScansSaySo) {

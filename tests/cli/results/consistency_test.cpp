@@ -44,7 +44,7 @@ class ConsistencyVerb : public ::testing::Test {
   }
   static json document(const json& pairs) {
     return {{"gpureg", "batch"},
-            {"options", {{"prepare", {{"voxel_size", 0.05}}}, {"min_confidence", 0.5}}},
+            {"options", {{"voxel_size", 0.05}, {"min_confidence", 0.5}}},
             {"pairs", pairs}};
   }
   const TemporaryFolder folder_;

@@ -8,8 +8,7 @@ int main(int argc, char** argv) {
   using Cloud = pcl::PointCloud<pcl::PointXYZ>;
   const gpureg::PointCloud source = gpureg::io::read_point_cloud(argv[1]),
                            target = gpureg::io::read_point_cloud(argv[2]);
-  gpureg::PclRegistration<pcl::PointXYZ> registration(
-      gpureg::RegistrationOptions::from_voxel_size(0.05f));
+  gpureg::PclRegistration<pcl::PointXYZ> registration(gpureg::RegistrationOptions{0.05f});
   registration.setInputSource(
       pcl::make_shared<Cloud>(gpureg::to_pcl<pcl::PointXYZ>(source.view())));
   registration.setInputTarget(

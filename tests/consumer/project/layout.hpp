@@ -20,14 +20,10 @@ inline std::string layout() {
   TYPE(PointCloudView);
   TYPE(PointCloud);
   TYPE(PrepareOptions);
-  TYPE(CompatibilityOptions);
-  TYPE(QuadrupleOptions);
-  TYPE(EvidenceOptions);
-  TYPE(RefineOptions);
   TYPE(RegistrationOptions);
   MEMBER(RegistrationOptions, quadruples);
   MEMBER(RegistrationOptions, method);
-  MEMBER(RegistrationOptions, refine);
+  MEMBER(RegistrationOptions, prepare);
   TYPE(Context);
   TYPE(PreparedCloud);
   TYPE(Correspondence);
