@@ -76,22 +76,43 @@ def other_pairs():
     return rows + ["", source(record) + "."]
 
 
-def kinds_of_places():
-    """Every kind of place, scored by a fit on all other kinds."""
+def runs_of_kinds():
+    """Of every kind of place and what is known of its viewpoints, each scored by a fit on all other kinds."""
     groups = {}
     for run in load("confidence.json")["runs"]:
         groups.setdefault((run["kind"], run["viewpoints"]), []).append(run)
+    return sorted(groups.items())
+
+
+def kinds_of_places():
     out = [
         "| kind | viewpoints | runs | first correct / any mode, % | R@P95, % | ECE | correct above 0.9 | correct poses reported from 0.5 on, % | precision, % |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for (kind, viewpoints), runs in sorted(groups.items()):
+    for (kind, viewpoints), runs in runs_of_kinds():
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
         total = lambda key: sum(run[key] for run in runs)  # noqa: B023,E731
         out.append(
             f"| {kind} | {'none' if viewpoints == 'unknown' else viewpoints} | {len(runs)} | {of('raw'):.1f} / {of('generated'):.1f} | {of('geo_R@P95'):.1f} | "
             f"{of('ECE'):.3f} | {total('right_above_0.9_count')} of {total('above_0.9')} | {100 * total('right_from_0.5') / total('right'):.0f} | "
             f"{100 * total('right_from_0.5') / max(1, total('from_0.5')):.0f} |"
+        )
+    return out
+
+
+def kinds_of_places_short():
+    """With known viewpoints."""
+    out = [
+        "| kind | first correct, % | R@P95, % | ECE | correct above 0.9 |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for (kind, viewpoints), runs in runs_of_kinds():
+        if viewpoints == "unknown":
+            continue
+        of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
+        total = lambda key: sum(run[key] for run in runs)  # noqa: B023,E731
+        out.append(
+            f"| {kind} | {of('raw'):.1f} | {of('geo_R@P95'):.1f} | {of('ECE'):.3f} | {total('right_above_0.9_count')} of {total('above_0.9')} |"
         )
     return out
 
@@ -145,7 +166,7 @@ def closing_loops():
 def loop_consistency_fresh():
     record = load("loop_consistency_fresh.json")
     out = [
-        "| scene | first correct, % | R@P95, % | R@P99, % | ECE | correct above 0.9, % |",
+        "| scene | first correct, % | R@P95, % | R@P99, % | ECE | correct above 0.9 |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for scene in record["scenes"]:
@@ -443,6 +464,7 @@ TABLES = {
     "range_pairs": range_pairs,
     "other_pairs": other_pairs,
     "kinds_of_places": kinds_of_places,
+    "kinds_of_places_short": kinds_of_places_short,
     "loop_consistency": loop_consistency,
     "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,
