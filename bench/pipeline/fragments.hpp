@@ -18,7 +18,7 @@ std::vector<PointCloudView> views();
 /// Every pair once.
 std::vector<Pair> all_pairs();
 
-/// QuadrupleOptions::max_survivors that real pairs stay below.
+/// RegistrationOptions::tune, of a number that real pairs stay below.
 constexpr const char* kAllSurvivors = "quadruples.max_survivors=262144";
 
 /// Means over the results, and milliseconds per pair of that many runs.

@@ -161,7 +161,7 @@ NaiveResult Naive::align(const PreparedState& source_state, const PreparedState&
   target.closest = grid_of(target_state);
   if (options_.smaller_as_source && target.size < source.size) std::swap(source, target);
   Arrays& a = *arrays_;
-  const QuadrupleOptions& o = options_.quadruples;
+  const QuadrupleSettings& o = options_.quadruples;
   std::uint32_t* match_count = a.counts.data();
   const auto blocks = [](std::size_t items) {
     return static_cast<unsigned>((items + kThreads - 1) / kThreads);

@@ -26,7 +26,7 @@ NEAR_ONE = (0.9, 1.1)
 
 
 def figures(scene, context):
-    options = gpureg.RegistrationOptions(float(scene.voxel))
+    options = gpureg.RegistrationOptions(voxel_size=float(scene.voxel))
     seen = [k for k, cloud in enumerate(scene.clouds) if cloud]
     place = {k: n for n, k in enumerate(seen)}
     asked = [(s, t, truths[0]) for s, t, truths in scene.pairs if truths]

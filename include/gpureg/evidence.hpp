@@ -10,7 +10,7 @@ namespace gpureg {
 /// of the source, moved by the pose into the other cloud, the target; `target_*`: roles exchanged.
 /// N: their number. `near(p)`: the nearest point of the other cloud is within
 /// max_correspondence_distance; d(p): that distance. `fits(p)`: near, and the normals differ by at
-/// most EvidenceOptions::max_normal_angle.
+/// most 30 degrees.
 /// `sum(a : b)`: of a over the points with b.
 struct PoseEvidence {
   std::uint32_t match_inliers = 0;  ///< number of matches within consensus_distance at the pose

@@ -11,7 +11,7 @@ namespace gpureg {
 /// Result of align_within().
 struct TimedResult {
   RegistrationResult result;  ///< the result with the highest confidence of all levels run
-  /// Quality level of the result: it equals align() with options.with_quality(quality).
+  /// Quality level of the result: it equals align() with this options.quality.
   std::uint32_t quality = 0;
   std::uint32_t highest_quality = 0;  ///< the highest level run
   std::uint32_t levels = 0;           ///< number of levels run; some in between may be left out
@@ -27,7 +27,7 @@ struct TimedResult {
 /// Not deterministic: the clock decides which levels run. The result of
 /// each level is deterministic. Thread-safe; calls of other threads on the same context delay it.
 /// @param milliseconds wall time from the call, without preparation, finite and > 0.
-/// @param options as for align(); with_quality() overrides them per level.
+/// @param options as for align(); quality is set per level.
 /// @throws InvalidArgument as align(), for milliseconds out of range, and for
 ///   RegistrationMethod::quadruples, which has no levels.
 TimedResult align_within(const Context& context, const PreparedCloud& source,

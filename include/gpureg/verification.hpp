@@ -11,7 +11,7 @@
 namespace gpureg {
 
 struct VerificationOptions {
-  /// Refine every pose by ICP (RegistrationOptions::refine) before it is verified.
+  /// Refine every pose by ICP (RegistrationOptions::refine_iterations) before it is verified.
   bool refine = false;
   /// Also align the pair, so that the confidence of a pose takes the alternatives into account, as
   /// that of align() does. Without, a pose competes with the other given ones only: faster, and too

@@ -11,7 +11,6 @@
 #include "api/name_cloud.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
-#include "api/prepare_copies.hpp"
 #include "api/raw_cloud.hpp"
 #include "api/variants.hpp"
 #include "api/with_settings.hpp"

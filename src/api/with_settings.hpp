@@ -14,6 +14,12 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const std::vector<PointCloudView>& clouds,
                                          const PrepareSettings& settings,
                                          const std::vector<std::string>& names = {});
+/// Prepares copies of one cloud, multiplied by scales, for Engine::match() alone: without what
+/// poses are verified by. Where nobody gave viewpoints, one copy decides about the sides of all.
+std::vector<PreparedCloud> prepare_copies(const Context& context,
+                                          const std::vector<PointCloudView>& copies,
+                                          const std::vector<double>& scales,
+                                          const PrepareSettings& settings);
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationSettings& settings);
 RegistrationResult align(const Context& context, const PointCloudView& source,

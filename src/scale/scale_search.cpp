@@ -7,7 +7,6 @@
 
 #include "api/access.hpp"
 #include "api/frames.hpp"
-#include "api/prepare_copies.hpp"
 #include "api/with_settings.hpp"
 #include "common/for_each_on.hpp"
 

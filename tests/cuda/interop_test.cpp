@@ -80,8 +80,7 @@ TEST_F(Interop, CloudsOnTheDeviceAreThoseOfTheHost) {
     PointCloudView host(scans[0]);
     host.viewpoints = view.viewpoints = viewpoint;
     host.viewpoint_count = view.viewpoint_count = 1;
-    expect_same(prepare(context, view, options.prepare, stream),
-                prepare(context, host, options.prepare));
+    expect_same(prepare(context, view, given, stream), prepare(context, host, given));
     // With rows of other things: "normals" and features that are just the points of other scans.
     scans[1].resize(scans[0].size(), {1, 0, 0});
     scans[2].resize(scans[0].size(), {0, 1, 0});
@@ -94,19 +93,18 @@ TEST_F(Interop, CloudsOnTheDeviceAreThoseOfTheHost) {
     host.normals = scans[1][0].data();
     host.features = scans[2][0].data();
     host.feature_dimension = 3;
-    expect_same(prepare(context, view, options.prepare, stream),
-                prepare(context, host, options.prepare));
+    expect_same(prepare(context, view, given, stream), prepare(context, host, given));
     for (float* p : {points, normals, features}) cudaFreeAsync(p, stream);
   }
-  expect_same(prepare(context, DevicePointCloudView{}, options.prepare, stream),
-              prepare(context, PointCloudView{}, options.prepare));
+  expect_same(prepare(context, DevicePointCloudView{}, given, stream),
+              prepare(context, PointCloudView{}, given));
 }
 
 // The stream of the program is blocked before it writes the cloud: the call returns all the same,
 // and later work in the stream does not affect the prepared cloud.
 TEST_F(Interop, TheCallWaitsForNothingAndTheStreamKeepsItsOrder) {
   const Context context = Context::cuda();
-  const PreparedCloud expected = prepare(context, PointCloudView(scans[0]), options.prepare);
+  const PreparedCloud expected = prepare(context, PointCloudView(scans[0]), given);
   float* points = on_device(scans[0], 3);
   const std::size_t size = scans[0].size() * 3 * sizeof(float);
   float* empty = nullptr;
@@ -117,7 +115,7 @@ TEST_F(Interop, TheCallWaitsForNothingAndTheStreamKeepsItsOrder) {
   view.size = scans[0].size();
   Gate gate(stream);
   ASSERT_EQ(cudaMemcpyAsync(empty, points, size, cudaMemcpyDeviceToDevice, stream), cudaSuccess);
-  std::future<PreparedCloud> prepared = prepare_async(context, view, options.prepare, stream);
+  std::future<PreparedCloud> prepared = prepare_async(context, view, given, stream);
   ASSERT_EQ(cudaMemsetAsync(empty, 0xff, size, stream), cudaSuccess);
   EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout)
       << "nothing has written the points yet";
@@ -130,16 +128,16 @@ TEST_F(Interop, TheCallWaitsForNothingAndTheStreamKeepsItsOrder) {
 
 TEST_F(Interop, FuturesHoldTheResults) {
   for (const Context& context : {Context::cuda(), Context::cpu(2)}) {
-    const auto clouds = prepare_batch(context, views, options.prepare);
-    const auto expected = test::all_bytes(align_batch(context, clouds, pairs, options));
-    auto all = align_batch_async(context, clouds, pairs, options);
+    const auto clouds = prepare_batch(context, views, given);
+    const auto expected = test::all_bytes(align_batch(context, clouds, pairs, given));
+    auto all = align_batch_async(context, clouds, pairs, given);
     std::vector<std::future<RegistrationResult>> one_by_one;
     for (const Pair& pair : pairs)
-      one_by_one.push_back(align_async(context, clouds[pair.source], clouds[pair.target], options));
+      one_by_one.push_back(align_async(context, clouds[pair.source], clouds[pair.target], given));
     EXPECT_EQ(test::all_bytes(all.get()), expected);
     for (std::size_t k = 0; k < pairs.size(); ++k)
       EXPECT_EQ(bytes(one_by_one[k].get()), expected[k]);
-    EXPECT_THROW(align_async(context, clouds[0], PreparedCloud(), options).get(), InvalidArgument);
+    EXPECT_THROW(align_async(context, clouds[0], PreparedCloud(), given).get(), InvalidArgument);
   }
 }
 
@@ -148,8 +146,7 @@ TEST_F(Interop, ContextsOfSeveralDevicesFindTheCloudsDevice) {
   int devices = 0;
   ASSERT_EQ(cudaGetDeviceCount(&devices), cudaSuccess);
   two.devices = {0, devices - 1};
-  const PreparedCloud expected =
-      prepare(Context::cuda(), PointCloudView(scans[0]), options.prepare);
+  const PreparedCloud expected = prepare(Context::cuda(), PointCloudView(scans[0]), given);
   for (int d = 0; d < devices; d += std::max(1, devices - 1)) {
     ASSERT_EQ(cudaSetDevice(d), cudaSuccess);
     cudaStream_t there = nullptr;
@@ -162,9 +159,8 @@ TEST_F(Interop, ContextsOfSeveralDevicesFindTheCloudsDevice) {
     DevicePointCloudView view;
     view.points = points;
     view.size = scans[0].size();
-    expect_same(prepare(Context::cuda(two), view, options.prepare, there), expected);
-    if (d > 0)
-      EXPECT_THROW(prepare(Context::cuda(0), view, options.prepare, there), InvalidArgument);
+    expect_same(prepare(Context::cuda(two), view, given, there), expected);
+    if (d > 0) EXPECT_THROW(prepare(Context::cuda(0), view, given, there), InvalidArgument);
     cudaFree(points);
     cudaStreamDestroy(there);
   }
@@ -174,17 +170,17 @@ TEST_F(Interop, ContextsOfSeveralDevicesFindTheCloudsDevice) {
 // A stream of the program that waits for the context itself must not hold the context up.
 TEST_F(Interop, OtherCallsDoNotWaitForTheStreamOfACloud) {
   const Context context = Context::cuda();
-  const auto clouds = prepare_batch(context, views, options.prepare);
-  const auto expected = test::all_bytes(align_batch(context, clouds, pairs, options));
+  const auto clouds = prepare_batch(context, views, given);
+  const auto expected = test::all_bytes(align_batch(context, clouds, pairs, given));
   float* points = on_device(scans[0], 3);
   DevicePointCloudView view;
   view.points = points;
   view.size = scans[0].size();
   Gate gate(stream);
-  std::future<PreparedCloud> prepared = prepare_async(context, view, options.prepare, stream);
+  std::future<PreparedCloud> prepared = prepare_async(context, view, given, stream);
   // Its thread is in the engine by now.
   EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
-  auto aligned = align_batch_async(context, clouds, pairs, options);
+  auto aligned = align_batch_async(context, clouds, pairs, given);
   const bool finished = aligned.wait_for(std::chrono::seconds(60)) == std::future_status::ready;
   EXPECT_EQ(cudaStreamQuery(stream), cudaErrorNotReady) << "the stream was not held up";
   gate.open();
@@ -196,7 +192,7 @@ TEST_F(Interop, OtherCallsDoNotWaitForTheStreamOfACloud) {
 
 TEST_F(Interop, ABatchIsThatOfTheHost) {
   const Context context = Context::cuda();
-  const auto expected = prepare_batch(context, views, options.prepare);
+  const auto expected = prepare_batch(context, views, given);
   cudaStream_t other = nullptr;
   ASSERT_EQ(cudaStreamCreateWithFlags(&other, cudaStreamNonBlocking), cudaSuccess);
   std::vector<DevicePointCloudView> device(views.size());
@@ -206,20 +202,19 @@ TEST_F(Interop, ABatchIsThatOfTheHost) {
     device[k].size = scans[k].size();
     if (k % 2 == 1) streams[k] = other;
   }
-  const auto prepared = prepare_batch_async(context, device, options.prepare, streams).get();
+  const auto prepared = prepare_batch_async(context, device, given, streams).get();
   ASSERT_EQ(prepared.size(), expected.size());
   for (std::size_t k = 0; k < prepared.size(); ++k) expect_same(prepared[k], expected[k]);
-  const auto by_one_stream = prepare_batch_async(context, device, options.prepare, {stream}).get();
+  const auto by_one_stream = prepare_batch_async(context, device, given, {stream}).get();
   for (std::size_t k = 0; k < prepared.size(); ++k) expect_same(by_one_stream[k], expected[k]);
-  EXPECT_TRUE(prepare_batch_async(context, {}, options.prepare, {stream}).get().empty());
-  EXPECT_THROW(prepare_batch_async(context, device, options.prepare, {stream, other}),
-               InvalidArgument);
+  EXPECT_TRUE(prepare_batch_async(context, {}, given, {stream}).get().empty());
+  EXPECT_THROW(prepare_batch_async(context, device, given, {stream, other}), InvalidArgument);
   // A cloud more than 2^20 voxels wide is named.
   const std::vector<Eigen::Vector3f> wide{{0, 0, 0}, {1e9f, 0, 0}};
   device[2].points = on_device(wide, 3);
   device[2].size = wide.size();
   try {
-    prepare_batch_async(context, device, options.prepare, streams).get();
+    prepare_batch_async(context, device, given, streams).get();
     ADD_FAILURE() << "a cloud too wide was prepared";
   } catch (const InvalidArgument& error) {
     EXPECT_EQ(std::string(error.what()).rfind("clouds[2]: ", 0), 0u) << error.what();
@@ -238,7 +233,7 @@ TEST_F(Interop, NormalsAndFeaturesOfOtherStreamsAreAwaited) {
   host.normals = scans[1][0].data();
   host.features = scans[2][0].data();
   host.feature_dimension = 3;
-  const PreparedCloud expected = prepare(context, host, options.prepare);
+  const PreparedCloud expected = prepare(context, host, given);
   const std::size_t size = scans[0].size() * 3 * sizeof(float);
   float *points = on_device(scans[0], 3), *normals = on_device(scans[1], 3),
         *features = on_device(scans[2], 3);
@@ -263,7 +258,7 @@ TEST_F(Interop, NormalsAndFeaturesOfOtherStreamsAreAwaited) {
   view.features = late[1];
   view.feature_dimension = 3;
   view.feature_stream = others[1];
-  std::future<PreparedCloud> prepared = prepare_async(context, view, options.prepare, stream);
+  std::future<PreparedCloud> prepared = prepare_async(context, view, given, stream);
   // What comes later in these streams changes nothing.
   for (int k = 0; k < 2; ++k)
     ASSERT_EQ(cudaMemsetAsync(late[k], 0xff, size, others[k]), cudaSuccess);
@@ -290,7 +285,7 @@ TEST_F(Interop, DeviceMemoryIsNoHostCloud) {
                                                           {"cloud.normals", bad_normals},
                                                           {"cloud.features", bad_features}};
   for (const auto& [field, bad] : cases) try {
-      prepare(context, bad, options.prepare);
+      prepare(context, bad, given);
       ADD_FAILURE() << field << " in device memory was taken for host memory";
     } catch (const InvalidArgument& error) {
       EXPECT_NE(std::string(error.what()).find(std::string(field) + " is memory of device"),
@@ -303,8 +298,7 @@ TEST_F(Interop, DeviceMemoryIsNoHostCloud) {
   ASSERT_EQ(cudaMallocManaged(&managed, size), cudaSuccess);
   std::memcpy(managed, scans[0][0].data(), size);
   view.points = static_cast<const float*>(managed);
-  expect_same(prepare(context, view, options.prepare),
-              prepare(context, PointCloudView(scans[0]), options.prepare));
+  expect_same(prepare(context, view, given), prepare(context, PointCloudView(scans[0]), given));
   cudaFree(managed);
   cudaFreeAsync(points, stream);
 }
@@ -315,7 +309,7 @@ TEST_F(Interop, WrongMemoryIsAnError) {
   view.points = scans[0][0].data();
   view.size = scans[0].size();
   try {
-    prepare_async(context, view, options.prepare, stream);
+    prepare_async(context, view, given, stream);
     FAIL() << "host memory was taken for device memory";
   } catch (const InvalidArgument& error) {
     EXPECT_NE(std::string(error.what()).find("cloud.points is not device memory"),
@@ -324,9 +318,9 @@ TEST_F(Interop, WrongMemoryIsAnError) {
   }
   float* points = on_device(scans[0], 3);
   view.points = points;
-  EXPECT_THROW(prepare_async(Context::cpu(), view, options.prepare, stream), InvalidArgument);
+  EXPECT_THROW(prepare_async(Context::cpu(), view, given, stream), InvalidArgument);
   view.point_stride = 2;
-  EXPECT_THROW(prepare_async(context, view, options.prepare, stream), InvalidArgument);
+  EXPECT_THROW(prepare_async(context, view, given, stream), InvalidArgument);
   cudaFreeAsync(points, stream);
 }
 

@@ -127,8 +127,8 @@ TEST(RedKitchenOnCuda, VerifiedPosesAreTheCpus) {
     VerificationOptions options;
     options.refine = refine;
     options.search_alternatives = refine;
-    const auto a = verify_poses_batch(cpu, on_cpu, pairs, poses, {}, options);
-    const auto b = verify_poses_batch(cuda, on_cuda, pairs, poses, {}, options);
+    const auto a = verify_poses_batch(cpu, on_cpu, pairs, poses, RegistrationOptions{}, options);
+    const auto b = verify_poses_batch(cuda, on_cuda, pairs, poses, RegistrationOptions{}, options);
     std::size_t verified = 0, different_evidence = 0, different_from_align = 0;
     for (std::size_t p = 0; p < pairs.size(); ++p)
       for (std::size_t k = 0; k < poses[p].size(); ++k, ++verified) {

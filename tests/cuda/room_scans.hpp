@@ -20,8 +20,9 @@ inline Results all_bytes(const std::vector<RegistrationResult>& results) {
 /// Six scans of a room and an empty cloud, and every pair of them.
 class RoomScans : public ::testing::Test {
  protected:
-  RoomScans() : options(resolve(RegistrationOptions{0.08f})) {
-    options.quadruples.count = 20000;
+  RoomScans() {
+    given.quadruples = 20000;
+    options = resolve(given);
     std::mt19937 random(1);
     for (int k = 0; k < 6; ++k) scans.push_back(moved(random_pose(random), scan_room(random)));
     scans.push_back({});
@@ -34,7 +35,8 @@ class RoomScans : public ::testing::Test {
     return all_bytes(
         align_batch(context, prepare_batch(context, views, options.prepare), list, options));
   }
-  RegistrationSettings options;
+  RegistrationOptions given{0.08f};
+  RegistrationSettings options;  ///< of them
   std::vector<std::vector<Eigen::Vector3f>> scans;
   std::vector<PointCloudView> views;
   std::vector<Pair> pairs;

@@ -156,7 +156,7 @@ TEST(PclAdapterUse, OptionsAreCheckedAndTakeEffect) {
   adapter.align(moved);
   EXPECT_LT(adapter.result().statistics.target_points, points)
       << "the prepared target of the old options was used";
-  EXPECT_EQ(adapter.getOptions().prepare.voxel_size, 0.1f);
+  EXPECT_EQ(adapter.getOptions().voxel_size, 0.1f);
   adapter.setContext(Context::cpu(1));
   EXPECT_EQ(adapter.getContext().threads(), 1u);
   adapter.align(moved);

@@ -90,9 +90,8 @@ TEST_F(LargeMap, WhatTooCoarseVoxelsLoseIsSearchedInThoseOfTheMap) {
 
 TEST_F(LargeMap, FindsTheScanWithTheSameBitsForOtherScansAndThreads) {
   const Query other(2, 1, 1), foreign(50, 0, 3);
-  const auto together =
-      locate(Context::cpu(1), {foreign.scan.view(), query_.scan.view(), other.scan.view()}, map_,
-             given_);
+  const auto together = locate(
+      Context::cpu(1), {foreign.scan.view(), query_.scan.view(), other.scan.view()}, map_, given_);
   EXPECT_EQ(together[0].status, LocateStatus::not_found);
   ASSERT_EQ(together[1].status, LocateStatus::found);
   EXPECT_LT(query_.error(together[1].poses.front()), 0.05);

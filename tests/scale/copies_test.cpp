@@ -3,7 +3,6 @@
 
 #include <random>
 
-#include "api/prepare_copies.hpp"
 #include "api/with_settings.hpp"
 #include "scale/ladder.hpp"
 #include "support/scan.hpp"
