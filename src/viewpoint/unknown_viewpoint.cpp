@@ -14,6 +14,7 @@
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
+#include "math/exponential.hpp"
 #include "pipeline/runs.hpp"
 
 namespace gpureg {
@@ -312,7 +313,7 @@ void UnknownViewpoints::decide(std::size_t cloud, PointsAndNormals surface,
 void UnknownViewpoints::decide_copies(const std::vector<std::shared_ptr<PreparedState>>& states,
                                       const std::vector<std::size_t>& copies) {
   const auto distance = [&](std::size_t k) {
-    return std::abs(std::log(static_cast<double>(states[k]->size) / kPointsOfDecision));
+    return std::abs(portable::log(static_cast<double>(states[k]->size) / kPointsOfDecision));
   };
   const std::size_t chosen =
       *std::min_element(copies.begin(), copies.end(),
