@@ -38,7 +38,8 @@ void run(const gpureg::Context& context, const std::string& file,
          const std::vector<std::string>& names) {
   PreparedMap map;
   const double load = seconds_of([&] { map = PreparedMap::load(file); });
-  const LocateOptions options = LocateOptions{RegistrationOptions{map.options().voxel_size}};
+  const LocateOptions options =
+      LocateOptions{gpureg::RegistrationOptions{map.options().voxel_size}};
   const Eigen::Vector3f sensor = Eigen::Vector3f::Zero();
   std::vector<gpureg::PointCloud> clouds;
   std::vector<gpureg::PointCloudView> scans;
