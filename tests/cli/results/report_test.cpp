@@ -63,10 +63,10 @@ TEST_F(Report, NumbersAlone) {
   const std::string html = page({});
   expect_self_contained(html);
   expect_holds(
-      html, {"voxel size 0.1 &middot;", "512 seeds per pair",
+      html, {"voxel size 0.1 &middot;", "quality 5 &middot;",
              "21 pairs of 7 fragments were tried, 10 reported as aligned. 11 are not: ",
              "Preparation, mean per fragment", "Alignment, mean per pair", ">match<", ">features<",
-             "Every pair", "too_little_overlap", "Options", ">max_verification_normal_angle<",
+             "Every pair", "too_little_overlap", "Options", ">max_correspondence_distance<",
              "<td>min_confidence</td><td>0.5</td>", "<td>method</td><td>compatibility</td>"});
   EXPECT_EQ(html.find("<img"), std::string::npos);
   EXPECT_EQ(html.find("Recall and precision"), std::string::npos);
