@@ -15,8 +15,8 @@
 /// every place and of none (shared_probability()) by bench/localization/fit_places.py.
 namespace gpureg::localization {
 
-/// Inputs of the regressions; more of any of them speaks for the place. Logarithms are negative
-/// where it says "no".
+/// Inputs of the regressions. A larger value never speaks against the place. Those that begin with
+/// `nothing` and `no` are minus the logarithm of the named share of points.
 enum class PlaceFeature : std::uint8_t {
   nothing_uncovered,      ///< points of the scan without a surface of the map
   no_map_in_free_space,   ///< map in free space of the scan
