@@ -26,7 +26,8 @@ enum class RegistrationReason : std::uint8_t {
   no_hypothesis_survived,
   /// All surviving quadruples were collinear or coincident, or no seed determined a pose.
   degenerate_geometry,
-  /// The best candidate is below quadruples.min_inlier_ratio (RegistrationMethod::quadruples).
+  /// The inlier ratio of the best candidate is below min_confidence
+  /// (RegistrationMethod::quadruples).
   inlier_ratio_too_low,
   /// The best candidate is below min_confidence (RegistrationMethod::compatibility) for no single
   /// reason below: all of the evidence together is too weak.
@@ -94,7 +95,7 @@ struct RegistrationStatistics {
   /// evidence.max_normal_angle.
   std::uint32_t inliers = 0;
   std::uint32_t refine_iterations = 0;  ///< of the returned pose
-  /// The target was moved onto the source, being the smaller cloud (smaller_as_source).
+  /// The target was moved onto the source, being the smaller cloud.
   bool swapped = false;
 };
 

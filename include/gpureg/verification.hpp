@@ -28,7 +28,7 @@ struct PoseVerification {
   double overlap_confidence = 0;
   PoseEvidence evidence;
   std::uint32_t inliers = 0;  ///< points of the moved cloud that overlap
-  std::uint32_t points = 0;   ///< points of the moved cloud: the smaller one, see smaller_as_source
+  std::uint32_t points = 0;   ///< points of the moved cloud, the smaller one
   double inlier_ratio = 0;    ///< inliers / points, [0, 1]
   double inlier_rmse = 0;     ///< metres, over the inliers
   /// Moments of all correspondences within max_correspondence_distance, from which information

@@ -114,12 +114,13 @@ def test_the_shipped_coefficients_make_the_confidences(name):
         )
         names = np.array(_core._confidence_feature_names())
         differs.update(names[(ranking != verified).any(0)])
-    # Small front violations rank modes alone, where free space is known, and so do the normals of scans on models.
-    ranking_alone = {
+    # Small front violations rank modes alone, where free space is known. In models, what the scan saw through
+    # verifies alone, and how well normals agree verifies up to the share of noisy scans.
+    of_one_alone = {
         (True, True, False): {"log_front_violation_near"},
-        (False, True, True): {"log_higher_weighted_overlap"},
+        (False, True, True): {"log_higher_weighted_overlap", "log_higher_violation"},
     }
-    assert differs == ranking_alone.get(tuple(model)[:3], set())
+    assert differs == of_one_alone.get(tuple(model)[:3], set())
 
 
 def test_the_header_is_of_todays_format():
