@@ -65,7 +65,10 @@ nitpick_ignore_regex = [
         r"cpp:.*",
         r"(std|Eigen|pcl|Unaligned\w+)::.*|reconstruction|UnalignedMatrix6d|UnalignedVector6d|gpureg(::(io|evaluation|files|pose_graph|reconstruction|loop_closure|localization|pruning))?|std|Eigen|pcl|pose_graph(::.*)?",
     ),
-    (r"cpp:.*", r"u?int\d+_t|size_t|CUstream_st|PreparedState|PrepareSettings|Engine|Base|Point\w+|SignatureT"),
+    (
+        r"cpp:.*",
+        r"u?int\d+_t|size_t|CUstream_st|PreparedState|PrepareSettings|Engine|Base|Point\w+|SignatureT",
+    ),
     (r"py:.*", r"(np|numpy|npt|pa|pyarrow|ray|collections|os|pathlib)\..*|Path|Any"),
     (r"py:.*", r"(gpureg\.)?_.*|results"),
     (
