@@ -100,23 +100,6 @@ def kinds_of_places():
     return out
 
 
-def kinds_of_places_short():
-    """With known viewpoints."""
-    out = [
-        "| kind | first correct, % | R@P95, % | ECE | correct above 0.9 |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    for (kind, viewpoints), runs in runs_of_kinds():
-        if viewpoints == "unknown":
-            continue
-        of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
-        total = lambda key: sum(run[key] for run in runs)  # noqa: B023,E731
-        out.append(
-            f"| {kind} | {of('raw'):.1f} | {of('geo_R@P95'):.1f} | {of('ECE'):.3f} | {total('right_above_0.9_count')} of {total('above_0.9')} |"
-        )
-    return out
-
-
 def loop_consistency():
     record = load("loop_consistency.json")
     out = [
@@ -464,7 +447,6 @@ TABLES = {
     "range_pairs": range_pairs,
     "other_pairs": other_pairs,
     "kinds_of_places": kinds_of_places,
-    "kinds_of_places_short": kinds_of_places_short,
     "loop_consistency": loop_consistency,
     "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,
