@@ -23,7 +23,7 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[1:1] = [str(HERE.parent / "accuracy"), str(HERE.parent / "peers")]
-import range_pairs
+import pairs as pairs_of_paper
 import record
 
 BOUNDS = (0.01, 0.02, 0.05)
@@ -46,19 +46,19 @@ class Pair:
     def __init__(self, folder):
         self.name = folder.name
         self.target, self.source = (
-            range_pairs.read_ply(folder / "Depth_0000.ply"),
-            range_pairs.read_ply(folder / "Depth_0001.ply"),
+            pairs_of_paper.read_ply(folder / "Depth_0000.ply"),
+            pairs_of_paper.read_ply(folder / "Depth_0001.ply"),
         )
         self.truth = [
             [float(v) for v in line.split()]
             for line in (folder / "gt.log").read_text().splitlines()[1:4]
         ]
-        self.together = range_pairs.together(self.source, self.target, self.truth)
+        self.together = pairs_of_paper.together(self.source, self.target, self.truth)
 
     def rmse(self, target_from_source):
         return math.sqrt(
             statistics.fmean(
-                math.dist(range_pairs.apply(target_from_source, p), q) ** 2
+                math.dist(pairs_of_paper.apply(target_from_source, p), q) ** 2
                 for p, q in self.together
             )
         )
@@ -81,14 +81,14 @@ def run_seed(arguments, names, about, pairs, seed, clouds, work, refined):
     import numpy as np
 
     generator = random.Random(seed)
-    poses = [range_pairs.random_pose(generator) for _ in pairs]
+    poses = [pairs_of_paper.random_pose(generator) for _ in pairs]
     errors, timings = {}, {}
     with tempfile.TemporaryDirectory() as temporary:
         temporary = pathlib.Path(temporary)
         for k, (pair, pose) in enumerate(zip(pairs, poses)):
             moved = np.array(
                 [
-                    range_pairs.apply(pose, row) + range_pairs.rotate(pose, row[3:])
+                    pairs_of_paper.apply(pose, row) + pairs_of_paper.rotate(pose, row[3:])
                     for row in pair.source
                 ],
                 np.float32,

@@ -25,57 +25,6 @@ def redkitchen():
     return rows + ["", *[line + "." for line in sources]]
 
 
-def redkitchen_seeds():
-    rows = [
-        "| preset | seed | correct best candidates | recall | precision | geometric precision |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
-    for file in sorted(RESULTS.glob("redkitchen_*.json"), reverse=True):
-        record = json.loads(file.read_text())
-        for run in record["runs"]:
-            strict, geometric = run["evaluate"]["strict"], run["evaluate"]["geometric"]
-            rows.append(
-                f"| `{record['preset']}` | {run['seed']} | {percent(strict['raw_recall'])} % | {percent(strict['recall'])} % "
-                f"({strict['good_recall']} of {strict['ground_truth']}) | {percent(strict['precision'])} % ({strict['good']} of "
-                f"{strict['reported']}) | {percent(geometric['precision'])} % |"
-            )
-    return rows
-
-
-def range_pairs():
-    rows = ["| method | RMSE, mean / max | pairs below .01 / .02 / .05 |", "| --- | --- | --- |"]
-    sources, best = [], []
-    for file in sorted(RESULTS.glob("range_pairs*.json")):
-        record = json.loads(file.read_text())
-        runs = record["runs"]
-        below = " / ".join(
-            f"{mean(run[f'below_{bound}'] for run in runs):.2f}" for bound in (0.01, 0.02, 0.05)
-        )
-        best.append(mean(run["rmse_mean_of_truth"] for run in runs))
-        rows.append(
-            f"| gpureg, default options, voxel {record['options']['prepare']['voxel_size']:g} | {mean(run['rmse_mean'] for run in runs):.4f} / "
-            f"{max(run['rmse_max'] for run in runs):.4f} | {below} |"
-        )
-        sources.append(source(record) + ".")
-    rows.append("| Fast Global Registration, as published | 0.0104 / 0.0193 | 0.60 / 1.00 / 1.00 |")
-    return rows + [f"| (the ground truth itself) | {best[0]:.4f} | |", "", *sources]
-
-
-def other_pairs():
-    record = load("other_pairs.json")
-    rows = ["| pair | seed | status | error |", "| --- | --- | --- | --- |"]
-    for run in record["lidar"]:
-        what = "refined" if run["refined"] else "before refinement"
-        rows.append(
-            f"| LiDAR, {what} | {run['seed']} | {run['status']} | {run['metres']:.3f} m, {run['degrees']:.2f} deg |"
-        )
-    for run in record["redwood_sample"]:
-        rows.append(
-            f"| Redwood's sample fragments | {run['seed']} | {run['status']} | confidence {run['score']:.2f} (no ground truth) |"
-        )
-    return rows + ["", source(record) + "."]
-
-
 def runs_of_kinds():
     """Of every kind of place and what is known of its viewpoints, each scored by a fit on all other kinds."""
     groups = {}
@@ -443,9 +392,6 @@ TABLES = {
     "decisions": decisions,
     "verification": verification,
     "redkitchen": redkitchen,
-    "redkitchen_seeds": redkitchen_seeds,
-    "range_pairs": range_pairs,
-    "other_pairs": other_pairs,
     "kinds_of_places": kinds_of_places,
     "loop_consistency": loop_consistency,
     "loop_consistency_fresh": loop_consistency_fresh,
