@@ -76,6 +76,18 @@ std::string write_cloud(const TemporaryFolder& folder, const std::string& name,
   return path;
 }
 
+nlohmann::json data_of(const std::string& page) {
+  const std::size_t begin = page.find(R"(id="data">)") + 10;
+  return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+}
+
+void expect_self_contained(const std::string& page) {
+  for (const char* link :
+       {"http://", "https://", " src=", "<link", "@import", "url(", "fetch(", "{{"})
+    EXPECT_EQ(page.find(link), std::string::npos) << link;
+  EXPECT_EQ(page.substr(page.size() - 24), "</script></body></html>\n");
+}
+
 nlohmann::json json_of(const std::string& path) { return nlohmann::json::parse(content_of(path)); }
 
 nlohmann::json without_times(nlohmann::json document) {

@@ -43,6 +43,11 @@ std::string write_cloud(const TemporaryFolder& folder, const std::string& name,
 
 nlohmann::json json_of(const std::string& path);
 
+/// The data of a page of the command.
+nlohmann::json data_of(const std::string& page);
+/// Nothing on the page comes from elsewhere, and no mark of its template is left.
+void expect_self_contained(const std::string& page);
+
 /// A result of `batch --json` without what the clock, the machine and the number of threads decide.
 nlohmann::json without_times(nlohmann::json document);
 

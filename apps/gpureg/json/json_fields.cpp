@@ -39,6 +39,13 @@ int fragment_member(const Json& object, const char* name) {
   return value.get<int>();
 }
 
+std::string text_of(const Json& json, const char* pointer) {
+  const Json::json_pointer at(pointer);
+  if (!json.contains(at)) return "";
+  const Json& value = json.at(at);
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
 double finite_number(const Json& value, const char* name) {
   if (!value.is_number() || !std::isfinite(value.get<double>()))
     fail(name, value, "a finite number");

@@ -10,6 +10,9 @@
 /// Members of JSON objects, checked. All throw InvalidArgument that names the member and its value.
 namespace gpureg::cli {
 
+/// The value at a JSON pointer, strings without quotes; empty if there is none. Throws nothing.
+std::string text_of(const Json& json, const char* pointer);
+
 const Json& member(const Json& object, const char* name);
 
 std::string text_member(const Json& object, const char* name);

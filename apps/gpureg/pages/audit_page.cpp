@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-#include "pages/plot.hpp"
+#include "pages/page.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {

@@ -5,15 +5,12 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <string>
 #include <unordered_set>
 
 #include "gpureg/files.hpp"
 #include "json/json.hpp"
-#include "pages/base64.hpp"
-#include "pages/map_page_files.hpp"
-#include "pages/plot.hpp"
+#include "pages/page.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 
@@ -228,19 +225,6 @@ Json links_json(std::vector<reconstruction::Link> links) {
   return out;
 }
 
-/// The page with its marks {{name}} replaced. What comes in may look like a mark itself.
-std::string filled(const std::string& page, const std::map<std::string, std::string>& values) {
-  std::string out;
-  for (std::size_t at = 0;;) {
-    const std::size_t mark = page.find("{{", at);
-    out += page.substr(at, mark - at);
-    if (mark == std::string::npos) return out;
-    const std::size_t end = page.find("}}", mark);
-    out += values.at(page.substr(mark + 2, end - mark - 2));
-    at = end + 2;
-  }
-}
-
 }  // namespace
 
 void write_map_page(const MapRun& run) {
@@ -257,15 +241,8 @@ void write_map_page(const MapRun& run) {
                      {"links", links_json(links)},
                      {"islands", std::move(islands)},
                      {"points", base64(points.bytes())}};
-  std::string text = data.dump();
-  // Nothing in the data may end the element that holds it.
-  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;)
-    text.replace(at, 1, "\\u003c");
-  files::write_atomically(
-      run.file("map.html"),
-      filled(kMapPageHtml, {{"title", "gpureg map: " + escaped(base_name(run.input.path))},
-                            {"script", kMapPageScript},
-                            {"data", text}}));
+  files::write_atomically(run.file("map.html"),
+                          filled(kMapPage, "gpureg map: " + base_name(run.input.path), data));
 }
 
 }  // namespace gpureg::cli

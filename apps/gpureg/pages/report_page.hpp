@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "pages/report_tables.hpp"
-#include "pages/stage_times.hpp"
 #include "records/result_file.hpp"
 
 namespace gpureg::cli {
@@ -20,16 +18,18 @@ struct Picture {
 struct ReportEntry {
   std::string name;  ///< tells the results of one page apart
   ResultFile result;
-  std::vector<PairRow> rows;  ///< of its pairs
-  StageTimes stages;          ///< of its pairs
-  std::string scene;          ///< name of the ground truth's folder, else of the fragments' folder
+  Json pairs = Json::array();  ///< pair_row() of its pairs
+  std::string scene;           ///< name of the ground truth's folder, else of the fragments' folder
   std::optional<evaluation::GroundTruth> truth;
   std::optional<evaluation::Evaluation> evaluation;  ///< with truth
   std::vector<Picture> pictures;
 };
 
+/// What the page shows of the JSON of a pair, whatever program wrote it.
+Json pair_row(const Json& pair);
+
 /// One self-contained HTML page: numbers, plots and pictures of each result. Several results come
 /// after a comparison. entries: at least one.
-std::string report_page(const std::vector<ReportEntry>& entries);
+std::string report_page(std::vector<ReportEntry> entries);
 
 }  // namespace gpureg::cli

@@ -35,7 +35,37 @@ std::vector<const PairRecord*> median_and_lowest(const std::vector<const PairRec
   return {pairs[(pairs.size() - 1) / 2], pairs.back()};
 }
 
+std::string reason(const PairRecord& pair) {
+  return ": " + pair.reason + (pair.explanation.empty() ? "" : ", " + pair.explanation);
+}
+
 std::string no_remark(const PairRecord&) { return ""; }
+
+// (recall, precision) for a falling score threshold. geometric: by the geometric rule, which needs
+// gt_all.log.
+std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth,
+                                                        const ResultFile& result, bool geometric) {
+  std::vector<evaluation::Report> reports = result.reports;
+  if (!geometric)
+    for (evaluation::Report& report : reports) {
+      report.score = report.strict_score.value_or(report.score);
+      report.strict_score.reset();
+    }
+  std::vector<double> thresholds;
+  for (const evaluation::Report& report : reports) thresholds.push_back(report.score);
+  std::sort(thresholds.begin(), thresholds.end(), std::greater<>());
+  thresholds.erase(std::unique(thresholds.begin(), thresholds.end()), thresholds.end());
+  std::vector<std::pair<double, double>> curve;
+  const std::size_t steps = std::min(kThresholds, thresholds.size());
+  for (std::size_t s = 0; s < steps; ++s) {
+    const std::size_t k = steps > 1 ? s * (thresholds.size() - 1) / (steps - 1) : 0;
+    for (evaluation::Report& report : reports) report.reported = report.score >= thresholds[k];
+    const evaluation::Evaluation e = evaluation::evaluate(truth, reports, false);
+    const evaluation::Scores& scores = geometric ? *e.geometric : e.strict;
+    curve.emplace_back(scores.recall(), scores.precision());
+  }
+  return curve;
+}
 
 }  // namespace
 
@@ -64,37 +94,11 @@ std::vector<EvaluatedPair> evaluate_pairs(const GroundTruth& truth, const Result
   return evaluated;
 }
 
-std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth,
-                                                        const ResultFile& result, bool geometric) {
-  std::vector<evaluation::Report> reports = result.reports;
-  if (!geometric)
-    for (evaluation::Report& report : reports) {
-      report.score = report.strict_score.value_or(report.score);
-      report.strict_score.reset();
-    }
-  std::vector<double> thresholds;
-  for (const evaluation::Report& report : reports) thresholds.push_back(report.score);
-  std::sort(thresholds.begin(), thresholds.end(), std::greater<>());
-  thresholds.erase(std::unique(thresholds.begin(), thresholds.end()), thresholds.end());
-  std::vector<std::pair<double, double>> curve;
-  const std::size_t steps = std::min(kThresholds, thresholds.size());
-  for (std::size_t s = 0; s < steps; ++s) {
-    const std::size_t k = steps > 1 ? s * (thresholds.size() - 1) / (steps - 1) : 0;
-    for (evaluation::Report& report : reports) report.reported = report.score >= thresholds[k];
-    const evaluation::Evaluation e = evaluation::evaluate(truth, reports, false);
-    const evaluation::Scores& scores = geometric ? *e.geometric : e.strict;
-    curve.emplace_back(scores.recall(), scores.precision());
-  }
-  return curve;
+void add_curves(Json& evaluation, const GroundTruth& truth, const ResultFile& result) {
+  for (const char* rule : {"strict", "geometric"})
+    if (evaluation.contains(rule))
+      evaluation[rule]["curve"] = recall_precision(truth, result, rule == std::string("geometric"));
 }
-
-namespace {
-
-std::string reason(const PairRecord& pair) {
-  return ": " + pair.reason + (pair.explanation.empty() ? "" : ", " + pair.explanation);
-}
-
-}  // namespace
 
 std::vector<SamplePair> samples(const ResultFile& result,
                                 const std::vector<EvaluatedPair>& evaluated, std::size_t each) {

@@ -20,10 +20,9 @@ struct EvaluatedPair {
 std::vector<EvaluatedPair> evaluate_pairs(const evaluation::GroundTruth& truth,
                                           const ResultFile& result);
 
-/// (recall, precision) for a falling score threshold. geometric: by the geometric rule, which needs
-/// gt_all.log.
-std::vector<std::pair<double, double>> recall_precision(const evaluation::GroundTruth& truth,
-                                                        const ResultFile& result, bool geometric);
+/// Adds to each rule of to_json(Evaluation) a "curve": [recall, precision] for a falling score
+/// threshold.
+void add_curves(Json& evaluation, const evaluation::GroundTruth& truth, const ResultFile& result);
 
 /// A pair to draw, with its caption.
 struct SamplePair {

@@ -42,11 +42,7 @@ Json document(const EvaluateOptions& o, const std::vector<SceneEvaluation>& scen
     const SceneEvaluation& s = scenes[k];
     Json scene = {{"scene", s.name}, {"result", o.results[k]}, {"ground_truth", o.truths[k]}};
     scene.update(to_json(s.evaluation));
-    if (s.result.has_scores) {
-      scene["strict"]["curve"] = recall_precision(s.truth, s.result, false);
-      if (s.evaluation.geometric)
-        scene["geometric"]["curve"] = recall_precision(s.truth, s.result, true);
-    }
+    if (s.result.has_scores) add_curves(scene, s.truth, s.result);
     scene["pairs"] = pair_verdicts(s.truth, s.result);
     for (const auto& [log, recall] : recalls[k])
       scene["registration_recall"].push_back({{"log", log},

@@ -14,10 +14,10 @@
 #include "gpureg/io.hpp"
 #include "inputs/cloud_file.hpp"
 #include "inputs/scan_input.hpp"
+#include "json/json_fields.hpp"
 #include "options/output_path.hpp"
 #include "pages/report_page.hpp"
 #include "pages/report_pairs.hpp"
-#include "pages/report_tables.hpp"
 #include "pictures/before_after.hpp"
 #include "text.hpp"
 #include "verbs/report.hpp"
@@ -76,10 +76,8 @@ std::vector<Picture> draw(const ResultFile& result, const std::vector<SamplePair
 ReportEntry read_entry(const ReportOptions& o, std::size_t k) {
   ReportEntry entry;
   entry.name = o.names.empty() ? o.results[k] : o.names[k];
-  entry.result = read_result(o.results[k], [&](const Json& pair) {
-    entry.rows.push_back(pair_row(pair));
-    entry.stages.add(pair["ms"]);
-  });
+  entry.result =
+      read_result(o.results[k], [&](const Json& pair) { entry.pairs.push_back(pair_row(pair)); });
   if (!entry.result.has_scores)
     throw IoError(o.results[k] +
                   ": a report needs RESULT.json of `gpureg batch --json`, this is a log");
@@ -120,7 +118,7 @@ void make(const ReportOptions& o) {
   std::vector<ReportEntry> entries;
   for (std::size_t k = 0; k < o.results.size(); ++k) entries.push_back(read_entry(o, k));
   for (std::size_t k = 0; k < entries.size(); ++k) add_pictures(value_for(k, o.clouds), entries[k]);
-  files::write_atomically(o.output, report_page(entries));
+  files::write_atomically(o.output, report_page(std::move(entries)));
 }
 
 }  // namespace

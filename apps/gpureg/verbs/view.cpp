@@ -14,9 +14,9 @@
 #include "gpureg/files.hpp"
 #include "inputs/cloud_file.hpp"
 #include "inputs/scan_input.hpp"
+#include "json/json_fields.hpp"
 #include "json/json_file.hpp"
 #include "pages/report_page.hpp"
-#include "pages/report_tables.hpp"
 #include "pictures/before_after.hpp"
 #include "text.hpp"
 #include "verbs/report.hpp"
@@ -62,8 +62,7 @@ void write_pair_page(Json document, const std::string& page) {
   ReportEntry entry;
   entry.scene = base_name(source) + " onto " + base_name(target);
   entry.result.pairs = {record_from_json(pair)};
-  entry.rows = {pair_row(pair)};
-  entry.stages.add(pair["ms"]);
+  entry.pairs.push_back(pair_row(pair));
   const PairRecord& record = entry.result.pairs.front();
   PosedTitle after{std::nullopt, "after: no pose found"};
   if (record.transform)
@@ -74,7 +73,7 @@ void write_pair_page(Json document, const std::string& page) {
                      encode_png(before_after(read_cloud(source, 0, MeshNote::none),
                                              read_cloud(target, 0, MeshNote::none), after))}};
   entry.result.document = std::move(document);
-  files::write_atomically(page, report_page({entry}));
+  files::write_atomically(page, report_page({std::move(entry)}));
 }
 
 /// The page of what the user names: found, or written beside it.
