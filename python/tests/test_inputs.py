@@ -331,7 +331,7 @@ def test_files_with_large_coordinates_warn(source, tmp_path):
 
 
 def growth():
-    """Of resident memory over ten thousand calls of each kind, bytes."""
+    """Of resident memory over two thousand calls of each kind, bytes."""
     context = gpureg.Context.cpu(1)
     small = np.ascontiguousarray(room()[:60])
     cloud = gpureg.prepare(small, context=context)
@@ -351,9 +351,9 @@ def growth():
         with open("/proc/self/statm") as file:
             return int(file.read().split()[1]) * resource.getpagesize()
 
-    work(1000)
+    work(400)
     before = resident()
-    work(10000)
+    work(2000)
     return resident() - before
 
 
@@ -369,9 +369,9 @@ def test_no_leak():
         text=True,
         check=True,
     )
-    # One leaked result or cloud per call would be 5 MB and more; what is allowed is the
+    # One leaked result or cloud per call would be 1 MB and more; what is allowed is the
     # allocator's.
-    assert int(done.stdout) < 2_000_000
+    assert int(done.stdout) < 400_000
 
 
 def test_viewpoints_that_cannot_be_what_a_cloud_was_seen_from():
