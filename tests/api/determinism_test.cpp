@@ -57,16 +57,6 @@ TEST_F(Determinism, SameBytesInAnyOrderAndAnySplit) {
   }
 }
 
-TEST_F(Determinism, PreparedCloudsAreTheSameAloneAndInABatch) {
-  const std::vector<PreparedCloud> batch = prepare_batch(Context::cpu(7), views, options.prepare);
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    const PreparedCloud alone = prepare(Context::cpu(1), views[k], options.prepare);
-    EXPECT_EQ(alone.points(), batch[k].points());
-    EXPECT_EQ(alone.normals(), batch[k].normals());
-    EXPECT_EQ(alone.features(), batch[k].features());
-  }
-}
-
 TEST_F(Determinism, AnotherSeedDrawsOtherHypotheses) {
   const auto first = run(Context::cpu(2), {pairs[0]});
   options.seed = 43;

@@ -159,22 +159,6 @@ TEST(Change, WhatTheMapNeverSawIsNotNew) {
     EXPECT_NE(result.scan.labels[k], ChangeLabel::appeared) << k;
 }
 
-TEST(Change, SameBitsForAnyNumberOfThreadsAndASavedMap) {
-  const PreparedMap map = map_of({{kFirst}});
-  const TemporaryFolder folder;
-  map.save(folder / "map");
-  const PreparedMap loaded = PreparedMap::load(folder / "map");
-  const PointCloud scan = Room{{kSecond}}.seen_from(kScanSensor);
-  const ChangeResult a = find_changes(Context::cpu(1), scan.view(), map,
-                                      UnalignedIsometry3d::Identity()),
-                     b = find_changes(Context::cpu(3), scan.view(), loaded,
-                                      UnalignedIsometry3d::Identity());
-  EXPECT_EQ(a.scan.labels, b.scan.labels);
-  EXPECT_EQ(a.scan.probabilities, b.scan.probabilities);
-  EXPECT_EQ(a.map.labels, b.map.labels);
-  EXPECT_EQ(a.map.probabilities, b.map.probabilities);
-}
-
 TEST(Change, WrittenWithColours) {
   PointCloud cloud;
   cloud.points = {{1, 2, 3}, {4, 5, 6}};

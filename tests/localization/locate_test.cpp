@@ -134,18 +134,6 @@ TEST(Locate, GravityThatContradictsLeavesNothing) {
   EXPECT_NE(locate(context(), query.scan.view(), map, prior).status, LocateStatus::found);
 }
 
-TEST(Locate, SameBitsForOtherScansThreadsAndACopyFromAFile) {
-  const PreparedMap map = building({1, 2, 3}, map_options(5));
-  const Query a(2, 1, 1), b(3, 2, 2), foreign(50, 0, 3);
-  const LocateOptions options = LocateOptions{RegistrationOptions{kVoxel}};
-  const std::vector<LocateResult> together =
-      locate(Context::cpu(1), {a.scan.view(), foreign.scan.view(), b.scan.view()}, map, options);
-  ASSERT_EQ(together.size(), 3u);
-  const PreparedMap again = building({1, 2, 3}, map_options(5));
-  EXPECT_EQ(numbers_of(locate(Context::cpu(3), b.scan.view(), again)), numbers_of(together[2]));
-  EXPECT_EQ(numbers_of(locate(context(), a.scan.view(), map)), numbers_of(together[0]));
-}
-
 TEST(Locate, LargeCoordinates) {
   MapBuilder builder(map_options());
   const Eigen::Vector3d far(450000, 5411000, 300);

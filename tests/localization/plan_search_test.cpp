@@ -256,15 +256,6 @@ TEST(PlanSearch, SaysNothingThatThePriorExcludes) {
     EXPECT_GT((place.map_from_scan.linear() * prior.gravity->source_up).x(), 0.996);
 }
 
-TEST(PlanSearch, SameBitsForAnyNumberOfThreads) {
-  const PreparedMap map = building({1, 2, 3, 4}, map_options());
-  const Scan scan = scan_of(Query(3, 2, 1).scan, MapState::of(map));
-  const std::vector<double> expected = numbers_of(places_of(scan, map, Context::cpu(1)));
-  EXPECT_FALSE(expected.empty());
-  for (const unsigned threads : {2u, 5u})
-    EXPECT_EQ(numbers_of(places_of(scan, map, Context::cpu(threads))), expected);
-}
-
 TEST(PlanSearch, MapsAndScansWithoutWallsHaveNoPlaces) {
   MapBuilder far(map_options());
   PointCloud cloud = seen_room(1, 1, Eigen::Isometry3d::Identity());
