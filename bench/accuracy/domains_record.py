@@ -11,7 +11,6 @@ the record keeps all other domains, and the commits that made them.
 usage: domains_record.py FOLDER [--only street,hall] [--commit COMMIT] [-o bench/results/domains.json]
 FOLDER: DOMAIN.json files of domains.py. Needs numpy, scikit-learn and the Python package gpureg."""
 
-import argparse
 import json
 import pathlib
 
@@ -42,9 +41,7 @@ def without_model(path):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = record.plain_parser(__doc__)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--commit", default=record.commit())
     parser.add_argument(

@@ -12,13 +12,12 @@ usage: few_points.py SCENE_FOLDER=RESULT.json... [-o bench/results/few_points.js
 RESULT.json: of `gpureg batch --voxel-size V --json` on a scene whose folder has gt_all.log and
 gt_all.info. Needs numpy and the Python package gpureg."""
 
-import argparse
 import json
 import pathlib
 
 import numpy as np
 from fit_confidence import MAX_ERROR, MIN_SEPARATION, REPORTED, blocks, errors, overlap_factor
-from record import commit, save
+from record import commit, plain_parser, save
 
 EDGES = (1, 10, 20, 30, 50, 75, 100, 150, 200, 300, 500)  # overlapping points, of the table's rows
 
@@ -60,9 +59,7 @@ def poses(text):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("runs", nargs="+", metavar="SCENE_FOLDER=RESULT.json")
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()

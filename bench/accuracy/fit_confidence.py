@@ -35,7 +35,6 @@ scene has poses.txt (fragment number, world_from_fragment), the record also coun
 false positives. Needs numpy, scikit-learn, the Python package gpureg, and clang-format for
 --header."""
 
-import argparse
 import collections
 import itertools
 import json
@@ -44,7 +43,7 @@ import pathlib
 import sys
 
 import numpy as np
-from record import save
+from record import plain_parser, save
 
 from confidence.model_header import write_header
 from confidence.regressions import (
@@ -500,9 +499,7 @@ def parse_run(text, viewpoints="known"):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("runs", nargs="+", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
     for name, meta, text in (
         ("--beside", "RUN=LABEL", "the second regression alone is fitted to them"),

@@ -16,7 +16,6 @@ The record then has counts, and keeps its other maps.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import pathlib
@@ -138,9 +137,7 @@ def counts(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = record.plain_parser(__doc__)
     parser.add_argument("--data", type=pathlib.Path, help="needed without --generated")
     parser.add_argument("--generated", type=pathlib.Path)
     parser.add_argument("--inside", type=int, default=8)

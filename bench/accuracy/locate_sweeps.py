@@ -13,7 +13,6 @@ metres at the origin of the scan.
 
 from __future__ import annotations
 
-import argparse
 import json
 import pathlib
 import resource
@@ -24,7 +23,7 @@ from typing import Any
 
 import locate
 import numpy as np
-from record import commit
+from record import commit, plain_parser
 
 RINGS = {16: (-15.0, 15.0), 64: (-24.8, 2.0)}
 COLUMNS, HEIGHT, NOISE, FOOT = 1800, 1.8, 0.02, 0.3048
@@ -159,9 +158,7 @@ def save(path: pathlib.Path, run: dict[str, Any], rows: list[dict[str, Any]]) ->
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("--name", required=True, help="of the map, in the record")
     parser.add_argument("--map", type=pathlib.Path, required=True)
     parser.add_argument("--voxel", default="0.5", help="of the search, metres")

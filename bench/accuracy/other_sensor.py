@@ -14,13 +14,12 @@ usage: other_sensor.py SCENE OUT [--drift METRES] [--noise METRES] [--bumps METR
 [--flying SHARE] [--seed N] Reads cloud_bin_<i>.ply whose vertices are binary floats. Needs
 numpy."""
 
-import argparse
 import pathlib
 import shutil
 import sys
 
 import numpy as np
-from record import cameras
+from record import cameras, plain_parser
 
 # Chosen by hand; no record compares other values.
 WAVES = 24  # in the sum that makes a field
@@ -66,9 +65,7 @@ def balls(points, share, radii, random):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("scene", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--drift", type=float, default=0.0)

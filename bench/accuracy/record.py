@@ -17,10 +17,14 @@ import rows
 RAW = ("curve",)  # a row for each threshold: too much for a record
 
 
-def parser(description, output):
-    result = argparse.ArgumentParser(
+def plain_parser(description):
+    return argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+
+
+def parser(description, output):
+    result = plain_parser(description)
     result.add_argument(
         "--gpureg", type=pathlib.Path, default=ROOT / "build/cpu/bin/gpureg", help="the command"
     )

@@ -23,7 +23,6 @@ made it.
 usage: viewpoints.py DATA [--gpureg COMMAND] [--sets kitchen,cad] [--pairs 40] [--seeds 1 2 3] [--json OUT]
 Needs numpy, Pillow for frames, and the Python package gpureg, which reads and writes the clouds."""
 
-import argparse
 import collections
 import json
 import pathlib
@@ -33,7 +32,7 @@ import tempfile
 
 import gpureg
 import numpy as np
-from record import cameras, commit, save
+from record import cameras, commit, plain_parser, save
 
 # triangles: of a model that is written as an STL file, or None.
 Cloud = collections.namedtuple("Cloud", "points viewpoints reach triangles", defaults=(None,))
@@ -389,9 +388,7 @@ def run(command, scene, seed, rng, condition, total, extra):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("data", type=pathlib.Path)
     parser.add_argument("--gpureg", default="gpureg", help="the command")
     parser.add_argument("--sets", default="kitchen,dragon,cad,kitti,lidar,fgr")

@@ -10,13 +10,12 @@ of a surface that was observed, and no viewpoint. The clouds are those of SCENE
 usage: without_viewpoints.py SCENE OUT [--unknown]
 Needs numpy, and --unknown the Python package gpureg."""
 
-import argparse
 import pathlib
 import shutil
 import sys
 
 import numpy as np
-from record import cameras
+from record import cameras, plain_parser
 
 EVERY = 5  # thins out the cameras, whose neighbours in the sequence stand close together
 
@@ -28,9 +27,7 @@ def towards(points, positions):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("scene", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--unknown", action="store_true", help="not even the origin is a viewpoint")

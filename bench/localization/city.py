@@ -30,7 +30,7 @@ import numpy as np
 from city_scene import City
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
-from record import commit
+from record import commit, plain_parser
 
 SENSORS = {  # elevations, rings, azimuths, columns, reach in metres
     "street 16": (-15, 15, 16, 360, 1800, 80),
@@ -297,9 +297,7 @@ def print_table(record: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("--buildings", type=int, default=10)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="a folder")
     parser.add_argument(

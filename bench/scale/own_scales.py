@@ -10,7 +10,6 @@ by least squares over all pairs (all in per cent). Pairs whose pose is not that 
 usage: own_scales.py DATA [--sets kitchen,house_a] [--pairs 150] [--backend cpu] [--json OUT]
 Needs numpy and the Python package gpureg."""
 
-import argparse
 import json
 import pathlib
 import sys
@@ -19,7 +18,7 @@ import gpureg
 import numpy as np
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
-from record import commit, save
+from record import commit, plain_parser, save
 from run import rigid_at, scenes_of
 
 NEAR_ONE = (0.9, 1.1)
@@ -62,9 +61,7 @@ def figures(scene, context):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("data", type=pathlib.Path)
     parser.add_argument("--sets", default="kitchen,house_a")
     parser.add_argument("--pairs", type=int, default=150)

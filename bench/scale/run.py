@@ -15,7 +15,6 @@ usage: run.py DATA [--sets kitchen,lidar] [--pairs 8] [--seeds 1 2 3] [--conditi
 --copy: what these arguments read of DATA, points alone, to measure on another machine.
 Needs numpy and the Python package gpureg."""
 
-import argparse
 import json
 import pathlib
 import shutil
@@ -27,7 +26,7 @@ import numpy as np
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
 import viewpoints
-from record import commit, save
+from record import commit, plain_parser, save
 
 FACTORS = (0.05, 20)
 SETS = ("kitchen", "house_a", "lidar", "kitti", "dragon", "cad", "fgr")
@@ -153,9 +152,7 @@ def run(name, scenes, limit, seed, condition, context):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = plain_parser(__doc__)
     parser.add_argument("data", type=pathlib.Path)
     parser.add_argument("--sets", default=",".join(SETS))
     parser.add_argument("--pairs", type=int, default=8, help="of a scene, at most")
