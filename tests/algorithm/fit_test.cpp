@@ -7,12 +7,10 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "algorithm/to_vec3.hpp"
+
 namespace gpureg {
 namespace {
-
-Vec3 to_vec3(const Eigen::Vector3d& v) {
-  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
 
 TEST(Fit, AgreesWithUmeyama) {
   std::mt19937 random(11);

@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "algorithm/to_vec3.hpp"
+
 namespace gpureg {
 namespace {
 
@@ -13,10 +15,6 @@ Eigen::Vector3d random_unit(std::mt19937& random) {
   std::normal_distribution<double> normal;
   return Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
 }
-Vec3 to_vec3(const Eigen::Vector3d& v) {
-  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
-
 /// Rusu et al. 2009, eq. 1, in double, with the source chosen by the smaller angle to the
 /// connecting line.
 bool reference(Eigen::Vector3d p1, Eigen::Vector3d n1, Eigen::Vector3d p2, Eigen::Vector3d n2,

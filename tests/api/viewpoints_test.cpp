@@ -11,7 +11,7 @@
 namespace gpureg {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 
 // A floor of 100 points whose normals, of any length, point up.
 PointCloud floor_cloud() {
@@ -44,8 +44,8 @@ TEST(ShareFacingAway, UnknownNormalsDoNotCount) {
   cloud.viewpoints = {{0, 0, -2}};
   for (int k = 0; k < 10; ++k) {
     cloud.normals[static_cast<std::size_t>(k)] = Eigen::Vector3f::Zero();
-    cloud.normals[static_cast<std::size_t>(10 + k)].setConstant(kNan);
-    cloud.points[static_cast<std::size_t>(20 + k)].setConstant(kNan);
+    cloud.normals[static_cast<std::size_t>(10 + k)].setConstant(kNoNumber);
+    cloud.points[static_cast<std::size_t>(20 + k)].setConstant(kNoNumber);
   }
   EXPECT_DOUBLE_EQ(cloud.view().share_facing_away(), 0.7);
   cloud.normals.clear();

@@ -20,10 +20,10 @@ namespace {
 using confidence::calibrate_modes;
 using confidence::ModeConfidence;
 
-constexpr float kVoxel = 0.1f;
+constexpr float kVoxelSize = 0.1f;
 
 RegistrationOptions options_with(const ConfidenceCalibration& calibration) {
-  RegistrationOptions options{kVoxel};
+  RegistrationOptions options{kVoxelSize};
   options.calibration = calibration;
   return options;
 }

@@ -13,10 +13,10 @@
 namespace gpureg::test {
 namespace {
 
-constexpr int kScans = 6;
-
 class AuditCommand : public ::testing::Test {
  protected:
+  static constexpr int kScans = 6;
+
   AuditCommand() { write_scans(scans_, kScans, false); }
 
   /// The true poses; scan `moved` is a metre off.

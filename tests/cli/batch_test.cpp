@@ -12,10 +12,10 @@
 namespace gpureg::test {
 namespace {
 
-constexpr int kScans = 4, kAll = (kScans + 2) * (kScans + 1) / 2;
-
 class Batch : public ::testing::Test {
  protected:
+  static constexpr int kScans = 4, kAll = (kScans + 2) * (kScans + 1) / 2;
+
   Batch() { write_scans(scans_, kScans, true); }
 
   Outcome batch(const std::string& name, const std::vector<std::string>& more = {}) const {

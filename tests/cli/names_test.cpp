@@ -16,11 +16,11 @@ const std::vector<std::string> kNames = {"a, \"b\" & c.ply", "kitchen north.ply"
                                          "K\xC3\xBC"
                                          "che <b>.ply",
                                          "Scan 2.PLY", "scan 10.ply"};
-constexpr std::size_t kPairs = 10;
-
 /// Scans with names, and the same scans as cloud_bin_<i>.
 class Names : public ::testing::Test {
  protected:
+  static constexpr std::size_t kPairs = 10;
+
   Names() {
     for (std::size_t k = 0; k < kNames.size(); ++k) {
       write_cloud(numbered_, "cloud_bin_" + std::to_string(k) + ".ply",

@@ -11,10 +11,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kScans = 6, kPairs = kScans * (kScans - 1) / 2;
-
 class Output : public ::testing::Test {
  protected:
+  static constexpr int kScans = 6, kPairs = kScans * (kScans - 1) / 2;
+
   Output() { write_scans(scans_, kScans, false); }
 
   std::vector<std::string> batch(const std::string& log,

@@ -17,11 +17,11 @@
 namespace gpureg::test {
 namespace {
 
-constexpr int kScans = 5;
-
 /// The data of a page.
 class ReconstructCommand : public ::testing::Test {
  protected:
+  static constexpr int kScans = 5;
+
   std::vector<std::string> reconstruct(const std::string& name,
                                        const std::vector<std::string>& more = {}) const {
     return joined(joined({"reconstruct", scans_.path(), "-o", out_ / name}, kSmall), more);

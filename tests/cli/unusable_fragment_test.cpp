@@ -10,11 +10,11 @@
 namespace gpureg::test {
 namespace {
 
-constexpr int kScans = 5, kPairs = 10, kOthers = 6;
-
 /// One fragment of five that cannot be read: it costs its own pairs, and is taken up when it can.
 class UnusableFragment : public ::testing::Test {
  protected:
+  static constexpr int kScans = 5, kPairs = 10, kOthers = 6;
+
   UnusableFragment() {
     write_scans(scans_, kScans, false);
     whole_ = content_of(bad_);

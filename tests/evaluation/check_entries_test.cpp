@@ -12,7 +12,9 @@ namespace {
 using test::expect_error;
 using test::TemporaryFolder;
 
-LogEntry pose(int i, int j, int count = 9) { return {i, j, count, Eigen::Matrix4d::Identity()}; }
+LogEntry entry_of(int i, int j, int count = 9) {
+  return {i, j, count, Eigen::Matrix4d::Identity()};
+}
 
 std::vector<LogEntry> written_and_read(const TemporaryFolder& folder,
                                        const std::vector<LogEntry>& entries) {
@@ -22,7 +24,7 @@ std::vector<LogEntry> written_and_read(const TemporaryFolder& folder,
 
 TEST(CheckEntries, EntriesKnowTheirLine) {
   const TemporaryFolder folder;
-  const auto entries = written_and_read(folder, {pose(0, 1), pose(8, 2), pose(2, 8)});
+  const auto entries = written_and_read(folder, {entry_of(0, 1), entry_of(8, 2), entry_of(2, 8)});
   EXPECT_EQ(entries[0].line, 1);
   EXPECT_EQ(entries[2].line, 11);
   check_entries("a.log", entries);
@@ -46,11 +48,12 @@ TEST(CheckEntries, NamesInconsistentBlocks) {
     const auto read = written_and_read(folder, entries);
     expect_error<IoError>([&] { check_entries("a.log", read); }, fragments);
   };
-  expect_bad({pose(0, 2), pose(0, 3, 8)}, {"a.log:6:", "pair 0 3", "8 fragments", "says 9"});
-  expect_bad({pose(0, 9)}, {"a.log:1:", "pair 0 9", "out of range", "9 fragments"});
-  expect_bad({pose(0, 2), pose(9, 1)}, {"a.log:6:", "pair 9 1", "out of range"});
-  expect_bad({pose(3, 3)}, {"a.log:1:", "pair 3 3", "itself"});
-  expect_bad({pose(0, 2), pose(0, 3), pose(0, 2)},
+  expect_bad({entry_of(0, 2), entry_of(0, 3, 8)},
+             {"a.log:6:", "pair 0 3", "8 fragments", "says 9"});
+  expect_bad({entry_of(0, 9)}, {"a.log:1:", "pair 0 9", "out of range", "9 fragments"});
+  expect_bad({entry_of(0, 2), entry_of(9, 1)}, {"a.log:6:", "pair 9 1", "out of range"});
+  expect_bad({entry_of(3, 3)}, {"a.log:1:", "pair 3 3", "itself"});
+  expect_bad({entry_of(0, 2), entry_of(0, 3), entry_of(0, 2)},
              {"a.log:11:", "pair 0 2", "stands twice, first in line 1"});
 }
 

@@ -19,6 +19,7 @@ using test::pcd_header;
 using test::ply_header;
 using test::raw;
 using test::raw_points;
+using test::replaced;
 using test::TemporaryFolder;
 
 void expect_bad(const std::string& content, std::initializer_list<std::string> fragments) {
@@ -27,10 +28,6 @@ void expect_bad(const std::string& content, std::initializer_list<std::string> f
   const std::string path = folder.write("cloud_bin_7.ply", content);
   expect_error<IoError>([&] { read_point_cloud(path); }, fragments);
   expect_error<IoError>([&] { read_point_cloud(path); }, {path});
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
 }
 
 TEST(BadFile, MissingEmptyOrSomethingElse) {

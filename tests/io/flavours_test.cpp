@@ -23,6 +23,7 @@ using test::expect_error;
 using test::ply_header;
 using test::raw;
 using test::raw_points;
+using test::replaced;
 using test::TemporaryFolder;
 
 struct Flavour {
@@ -55,10 +56,6 @@ std::string with_crlf(const std::string& text) {
   std::string out;
   for (const char c : text) out += c == '\n' ? "\r\n" : std::string(1, c);
   return out;
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
 }
 
 /// Each row of binary data with these bytes behind.

@@ -19,10 +19,6 @@ using test::TemporaryFolder;
 
 const Eigen::Vector3d kUtm(691000.25, 5200000.5, 312.125);
 
-PointCloud read(const std::string& content) {
-  return read_point_cloud(test::MemoryFile(content).path());
-}
-
 /// Points of a room of 6 m, relative to an offset.
 std::vector<Eigen::Vector3d> room(const Eigen::Vector3d& offset, int count = 500) {
   std::mt19937 random(1);
@@ -86,7 +82,7 @@ TEST(Origin, MapCoordinatesOfPlyAndPcdLoseNothing) {
         double_pcd(500, "ascii", sensor) + text_of(rows),
         double_pcd(500, "binary_compressed", sensor) + packed}) {
     SCOPED_TRACE(content.substr(0, 300));
-    const PointCloud cloud = read(content);
+    const PointCloud cloud = test::read_content(content);
     EXPECT_LT(error_of(cloud, rows), kRounding);
     EXPECT_EQ(cloud.origin, cloud.origin.array().round().matrix()) << "exact in decimal files";
     if (content.compare(0, 3, "ply") == 0) continue;
@@ -103,26 +99,28 @@ TEST(Origin, StrayPointsDoNotHideIt) {
   auto rows = room(kUtm);
   rows[7] = rows[300] = Eigen::Vector3d::Zero();
   rows[8].x() = NAN;
-  const PointCloud cloud = read(test::ply_header("binary_little_endian", 500, "double", false) +
-                                "end_header\n" + bytes_of(rows));
+  const PointCloud cloud =
+      test::read_content(test::ply_header("binary_little_endian", 500, "double", false) +
+                         "end_header\n" + bytes_of(rows));
   EXPECT_LT((cloud.origin - kUtm).norm(), 10);
 }
 
 TEST(Origin, CoordinatesThatFloatResolvesKeepZero) {
-  EXPECT_EQ(read(test::ply_header("ascii", 500, "float", false) + "end_header\n" +
-                 text_of(room({0, 0, 0})))
+  EXPECT_EQ(test::read_content(test::ply_header("ascii", 500, "float", false) + "end_header\n" +
+                               text_of(room({0, 0, 0})))
                 .origin,
             Eigen::Vector3d(0, 0, 0));
   // 30 m from the origin, and a scan of 6 m.
-  EXPECT_EQ(read(test::ply_header("binary_little_endian", 500, "double", false) + "end_header\n" +
-                 bytes_of(room({20, 20, 0})))
+  EXPECT_EQ(test::read_content(test::ply_header("binary_little_endian", 500, "double", false) +
+                               "end_header\n" + bytes_of(room({20, 20, 0})))
                 .origin,
             Eigen::Vector3d(0, 0, 0));
   // Whatever has been rounded to float32 stays as it is.
   std::vector<Eigen::Vector3d> rounded = room(kUtm);
   for (Eigen::Vector3d& p : rounded) p = p.cast<float>().cast<double>();
-  const PointCloud cloud = read(test::ply_header("binary_little_endian", 500, "double", false) +
-                                "end_header\n" + bytes_of(rounded));
+  const PointCloud cloud =
+      test::read_content(test::ply_header("binary_little_endian", 500, "double", false) +
+                         "end_header\n" + bytes_of(rounded));
   EXPECT_EQ(cloud.origin, Eigen::Vector3d(0, 0, 0));
   EXPECT_EQ(error_of(cloud, rounded), 0);
 }
@@ -130,7 +128,7 @@ TEST(Origin, CoordinatesThatFloatResolvesKeepZero) {
 TEST(Origin, WrittenCloudsReadBack) {
   const TemporaryFolder folder;
   const auto rows = room(kUtm);
-  PointCloud cloud = read(double_pcd(500, "binary", "0 0 0") + bytes_of(rows));
+  PointCloud cloud = test::read_content(double_pcd(500, "binary", "0 0 0") + bytes_of(rows));
   cloud.normals.assign(500, {0, 0, 1});
   write_point_cloud(folder / "a.ply", cloud);
   const PointCloud again = read_point_cloud(folder / "a.ply");

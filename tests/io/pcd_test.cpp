@@ -15,12 +15,8 @@ namespace {
 using test::pcd_header;
 using test::raw;
 
-PointCloud read(const std::string& content) {
-  return read_point_cloud(test::MemoryFile(content).path());
-}
-
 TEST(Pcd, TextWithFieldsInAnyOrder) {
-  const PointCloud cloud = read(
+  const PointCloud cloud = test::read_content(
       "# comment\nVERSION .7\nFIELDS rgb z histogram y x normal_x normal_y normal_z\nSIZE 4 4 4 8 "
       "4 4 4 4\nTYPE U F F F F F F F\n"
       "COUNT 1 1 3 1 1 1 1 1\nWIDTH 1\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n"
@@ -36,7 +32,7 @@ TEST(Pcd, OldHeadersWithoutCountAndViewpoint) {
   const std::string header =
       "VERSION .5\nCOLUMNS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA "
       "ascii\n";
-  EXPECT_EQ(read(header + "1 2 3\n4 5 6\n").points.at(1), Eigen::Vector3f(4, 5, 6));
+  EXPECT_EQ(test::read_content(header + "1 2 3\n4 5 6\n").points.at(1), Eigen::Vector3f(4, 5, 6));
 }
 
 TEST(Pcd, BinaryWithPaddingAndHistogram) {
@@ -46,7 +42,7 @@ TEST(Pcd, BinaryWithPaddingAndHistogram) {
   std::string body;
   for (const float k : {1.0f, 5.0f})
     body += raw(k) + raw(k + 1) + raw(static_cast<double>(k + 2)) + std::string(8, '\xff');
-  const PointCloud cloud = read(header + body);
+  const PointCloud cloud = test::read_content(header + body);
   ASSERT_EQ(cloud.points.size(), 2u);
   EXPECT_EQ(cloud.points[0], Eigen::Vector3f(1, 2, 3));
   EXPECT_EQ(cloud.points[1], Eigen::Vector3f(5, 6, 7));
@@ -55,7 +51,7 @@ TEST(Pcd, BinaryWithPaddingAndHistogram) {
 TEST(Pcd, AViewpointAwayFromTheOriginComesAlong) {
   std::string file = pcd_header(1, "ascii") + "1 2 3\n";
   file.replace(file.find("0 0 0 1 0 0 0"), 13, "0.5 -1 2 1 0 0 0");
-  const PointCloud cloud = read(file);
+  const PointCloud cloud = test::read_content(file);
   ASSERT_EQ(cloud.viewpoints.size(), 1u);
   EXPECT_EQ(cloud.viewpoints[0], Eigen::Vector3f(0.5f, -1, 2));
 }
@@ -63,7 +59,7 @@ TEST(Pcd, AViewpointAwayFromTheOriginComesAlong) {
 TEST(Pcd, CompressedColumnsWithLiteralsAndRepetitions) {
   for (const auto& seed : test::seed_files()) {
     if (seed.content.find("binary_compressed") == std::string::npos) continue;
-    const PointCloud cloud = read(seed.content);
+    const PointCloud cloud = test::read_content(seed.content);
     ASSERT_GE(cloud.points.size(), 2u);
     for (const Eigen::Vector3f& p : cloud.points) EXPECT_TRUE(p.allFinite());
     if (cloud.points.size() == 2) {
@@ -74,9 +70,9 @@ TEST(Pcd, CompressedColumnsWithLiteralsAndRepetitions) {
   std::string body;
   for (const float v : {1.f, 2.f, 3.f, 4.f, 5.f, 6.f}) body += raw(v);
   const std::string packed = test::pack_literally(body);
-  const PointCloud cloud =
-      read(pcd_header(2, "binary_compressed") + raw(static_cast<std::uint32_t>(packed.size())) +
-           raw(std::uint32_t{24}) + packed);
+  const PointCloud cloud = test::read_content(pcd_header(2, "binary_compressed") +
+                                              raw(static_cast<std::uint32_t>(packed.size())) +
+                                              raw(std::uint32_t{24}) + packed);
   EXPECT_EQ(cloud.points.at(0), Eigen::Vector3f(1, 3, 5));
   EXPECT_EQ(cloud.points.at(1), Eigen::Vector3f(2, 4, 6));
 }

@@ -45,8 +45,8 @@ void expect_pose(const Eigen::Isometry3d& truth, const Eigen::Isometry3d& found)
 
 template <typename Point>
 class PclAdapter : public ::testing::Test {};
-using Points = ::testing::Types<pcl::PointXYZ, pcl::PointXYZRGB, pcl::PointNormal>;
-TYPED_TEST_SUITE(PclAdapter, Points);
+using AdaptedPoints = ::testing::Types<pcl::PointXYZ, pcl::PointXYZRGB, pcl::PointNormal>;
+TYPED_TEST_SUITE(PclAdapter, AdaptedPoints);
 
 TYPED_TEST(PclAdapter, FindsTheKnownPoseAsTheDirectCallDoes) {
   std::mt19937 random(2);

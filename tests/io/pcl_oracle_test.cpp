@@ -27,9 +27,9 @@ void set_normal(pcl::PointXYZRGBNormal& p, const Eigen::Vector3f& n) {
 
 template <typename Point>
 class PclOracle : public ::testing::Test {};
-using Points = ::testing::Types<pcl::PointXYZ, pcl::PointXYZI, pcl::PointXYZRGB, pcl::PointNormal,
-                                pcl::PointXYZRGBNormal>;
-TYPED_TEST_SUITE(PclOracle, Points);
+using OraclePoints = ::testing::Types<pcl::PointXYZ, pcl::PointXYZI, pcl::PointXYZRGB,
+                                      pcl::PointNormal, pcl::PointXYZRGBNormal>;
+TYPED_TEST_SUITE(PclOracle, OraclePoints);
 
 template <typename Point>
 struct Example {

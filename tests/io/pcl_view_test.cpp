@@ -12,10 +12,11 @@ namespace {
 
 template <typename Point>
 class PclView : public ::testing::Test {};
-using Points = ::testing::Types<pcl::PointXYZ, pcl::PointXYZI, pcl::PointXYZRGB, pcl::PointXYZRGBA,
-                                pcl::PointXYZL, pcl::PointNormal, pcl::PointXYZINormal,
-                                pcl::PointXYZRGBNormal, pcl::PointWithViewpoint, pcl::PointSurfel>;
-TYPED_TEST_SUITE(PclView, Points);
+using ViewedPoints =
+    ::testing::Types<pcl::PointXYZ, pcl::PointXYZI, pcl::PointXYZRGB, pcl::PointXYZRGBA,
+                     pcl::PointXYZL, pcl::PointNormal, pcl::PointXYZINormal, pcl::PointXYZRGBNormal,
+                     pcl::PointWithViewpoint, pcl::PointSurfel>;
+TYPED_TEST_SUITE(PclView, ViewedPoints);
 
 template <typename Point>
 pcl::PointCloud<Point> random_cloud(std::size_t count) {

@@ -14,10 +14,6 @@ using test::ply_header;
 using test::raw;
 using test::raw_points;
 
-PointCloud read(const std::string& content) {
-  return read_point_cloud(test::MemoryFile(content).path());
-}
-
 // What raw_points() makes.
 void expect_points(const PointCloud& cloud, int count, bool normals) {
   ASSERT_EQ(cloud.points.size(), static_cast<std::size_t>(count));
@@ -35,30 +31,31 @@ TEST(Ply, BinaryOfBothByteOrdersAndBothPrecisions) {
   for (const bool normals : {false, true})
     for (const bool big : {false, true}) {
       const std::string format = big ? "binary_big_endian" : "binary_little_endian";
-      expect_points(read(ply_header(format, 5, "float", normals) + "end_header\n" +
-                         raw_points<float>(5, big, normals)),
+      expect_points(test::read_content(ply_header(format, 5, "float", normals) + "end_header\n" +
+                                       raw_points<float>(5, big, normals)),
                     5, normals);
-      expect_points(read(ply_header(format, 5, "float32", normals) + "end_header\n" +
-                         raw_points<float>(5, big, normals)),
+      expect_points(test::read_content(ply_header(format, 5, "float32", normals) + "end_header\n" +
+                                       raw_points<float>(5, big, normals)),
                     5, normals);
-      expect_points(read(ply_header(format, 5, "double", normals) + "end_header\n" +
-                         raw_points<double>(5, big, normals)),
+      expect_points(test::read_content(ply_header(format, 5, "double", normals) + "end_header\n" +
+                                       raw_points<double>(5, big, normals)),
                     5, normals);
-      expect_points(read(ply_header(format, 5, "float64", normals) + "end_header\n" +
-                         raw_points<double>(5, big, normals)),
+      expect_points(test::read_content(ply_header(format, 5, "float64", normals) + "end_header\n" +
+                                       raw_points<double>(5, big, normals)),
                     5, normals);
     }
 }
 
 TEST(Ply, Text) {
-  expect_points(read(ply_header("ascii", 3, "float", true) +
-                     "end_header\n0 0.25 0 0 0 1\n1\t+1.25e0 -1 0 0 1 \n\n  2 2.25 -2 0 0 1"),
-                3, true);
+  expect_points(
+      test::read_content(ply_header("ascii", 3, "float", true) +
+                         "end_header\n0 0.25 0 0 0 1\n1\t+1.25e0 -1 0 0 1 \n\n  2 2.25 -2 0 0 1"),
+      3, true);
 }
 
 TEST(Ply, TextOfTheRangeOfDouble) {
-  const PointCloud cloud = read(ply_header("ascii", 2, "float", false) +
-                                "end_header\nnan -inf 1e999\n-1e-999 1e39 1e-50\n");
+  const PointCloud cloud = test::read_content(ply_header("ascii", 2, "float", false) +
+                                              "end_header\nnan -inf 1e999\n-1e-999 1e39 1e-50\n");
   EXPECT_TRUE(std::isnan(cloud.points[0].x()));
   EXPECT_EQ(cloud.points[0].y(), -INFINITY);
   EXPECT_EQ(cloud.points[0].z(), INFINITY);
@@ -73,9 +70,9 @@ TEST(Ply, IntegersOfEverySizeAreCoordinates) {
       "y\nproperty int z\nproperty uchar nx\n"
       "property short ny\nproperty uint nz\nend_header\n";
   const PointCloud cloud =
-      read(header + raw(std::int8_t{-5}, true) + raw(std::uint16_t{65535}, true) +
-           raw(std::int32_t{-100000}, true) + raw(std::uint8_t{200}, true) +
-           raw(std::int16_t{-300}, true) + raw(std::uint32_t{4000000000u}, true));
+      test::read_content(header + raw(std::int8_t{-5}, true) + raw(std::uint16_t{65535}, true) +
+                         raw(std::int32_t{-100000}, true) + raw(std::uint8_t{200}, true) +
+                         raw(std::int16_t{-300}, true) + raw(std::uint32_t{4000000000u}, true));
   EXPECT_EQ(cloud.points.at(0), Eigen::Vector3f(-5, 65535, -100000));
   EXPECT_EQ(cloud.normals.at(0), Eigen::Vector3f(200, -300, 4e9f));
 }
@@ -90,7 +87,7 @@ TEST(Ply, OtherPropertiesInAnyOrderAreSkipped) {
   for (const float k : {1.0f, 2.0f})
     body += raw(std::uint8_t{7}) + raw(3 * k) + raw(0.5) + raw(k) + raw(std::int16_t{9}) +
             raw(static_cast<double>(2 * k));
-  const PointCloud cloud = read(header + body);
+  const PointCloud cloud = test::read_content(header + body);
   ASSERT_EQ(cloud.points.size(), 2u);
   EXPECT_EQ(cloud.points[0], Eigen::Vector3f(1, 2, 3));
   EXPECT_EQ(cloud.points[1], Eigen::Vector3f(2, 4, 6));
@@ -107,13 +104,13 @@ TEST(Ply, MeshesGiveTheirVertices) {
   };
   for (const bool big : {false, true}) {
     const std::string format = big ? "binary_big_endian" : "binary_little_endian";
-    expect_points(read(ply_header(format, 3, "float", false) + faces +
-                       raw_points<float>(3, big, false) + face(big)),
+    expect_points(test::read_content(ply_header(format, 3, "float", false) + faces +
+                                     raw_points<float>(3, big, false) + face(big)),
                   3, false);
   }
-  expect_points(
-      read(ply_header("ascii", 1, "float", false) + faces + "0 0.25 0\n3 0 0 0 0.5\n0 0.5\n"), 1,
-      false);
+  expect_points(test::read_content(ply_header("ascii", 1, "float", false) + faces +
+                                   "0 0.25 0\n3 0 0 0 0.5\n0 0.5\n"),
+                1, false);
 }
 
 TEST(Ply, ElementsBeforeTheVerticesAreSkipped) {
@@ -124,33 +121,35 @@ TEST(Ply, ElementsBeforeTheVerticesAreSkipped) {
       "nothing 99\n";
   const std::string strips =
       raw(std::uint16_t{2}) + raw(std::int16_t{1}) + raw(std::int16_t{2}) + raw(std::uint16_t{0});
-  expect_points(read("ply\nformat binary_little_endian 1.0\n" + before + vertex + raw(1.0) +
-                     strips + raw_points<float>(2, false, false)),
+  expect_points(test::read_content("ply\nformat binary_little_endian 1.0\n" + before + vertex +
+                                   raw(1.0) + strips + raw_points<float>(2, false, false)),
                 2, false);
-  expect_points(
-      read("ply\nformat ascii 1.0\n" + before + vertex + "1.5\n2 1 2\n0\n0 0.25 0\n1 1.25 -1\n"), 2,
-      false);
+  expect_points(test::read_content("ply\nformat ascii 1.0\n" + before + vertex +
+                                   "1.5\n2 1 2\n0\n0 0.25 0\n1 1.25 -1\n"),
+                2, false);
 }
 
 TEST(Ply, WindowsLineEnds) {
   const std::string header =
       "ply\r\nformat ascii 1.0\r\nelement vertex 1\r\nproperty float x\r\nproperty float "
       "y\r\nproperty float z\r\nend_header\r\n";
-  expect_points(read(header + "0 0.25 0\r\n"), 1, false);
+  expect_points(test::read_content(header + "0 0.25 0\r\n"), 1, false);
   std::string binary = header;
   binary.replace(binary.find("ascii"), 5, "binary_little_endian");
-  expect_points(read(binary + raw_points<float>(1, false, false)), 1, false);
+  expect_points(test::read_content(binary + raw_points<float>(1, false, false)), 1, false);
 }
 
 TEST(Ply, ACloudMayBeEmpty) {
-  EXPECT_TRUE(read(ply_header("ascii", 0, "float", true) + "end_header\n").points.empty());
   EXPECT_TRUE(
-      read(ply_header("binary_little_endian", 0, "float", false) + "end_header\n").points.empty());
+      test::read_content(ply_header("ascii", 0, "float", true) + "end_header\n").points.empty());
+  EXPECT_TRUE(
+      test::read_content(ply_header("binary_little_endian", 0, "float", false) + "end_header\n")
+          .points.empty());
 }
 
 TEST(Ply, AFinalLineEndAfterBinaryDataIsNoData) {
-  expect_points(read(ply_header("binary_little_endian", 2, "float", false) + "end_header\n" +
-                     raw_points<float>(2, false, false) + "\n"),
+  expect_points(test::read_content(ply_header("binary_little_endian", 2, "float", false) +
+                                   "end_header\n" + raw_points<float>(2, false, false) + "\n"),
                 2, false);
 }
 

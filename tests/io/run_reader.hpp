@@ -32,6 +32,11 @@ class MemoryFile {
   int fd_;
 };
 
+/// The point cloud of a file with this content.
+inline PointCloud read_content(std::string_view content) {
+  return io::read_point_cloud(MemoryFile(content).path());
+}
+
 /// Reads content with that reader. True: read; false: refused with an IoError that says where.
 /// Anything else goes up.
 inline bool run_reader(Reader reader, std::string_view content) {

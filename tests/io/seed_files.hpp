@@ -47,6 +47,10 @@ inline std::string ply_header(const std::string& format, int count, const std::s
   return header;
 }
 
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
 inline std::string pcd_header(int count, const std::string& data) {
   const std::string n = std::to_string(count);
   return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE "

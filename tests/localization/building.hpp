@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gpureg/localization.hpp"
+#include "support/cpu_context.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg::test {

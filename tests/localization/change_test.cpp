@@ -73,11 +73,6 @@ struct Room {
 const Eigen::Vector3f kFirst(1.5f, 1.2f, 0), kSecond(2.6f, 1.7f, 0);
 const Eigen::Vector3f kMapSensor(0.6f, 2.2f, 1.7f), kScanSensor(0.8f, 0.6f, 1.6f);
 
-const Context& context() {
-  static const Context cpu = Context::cpu(2);
-  return cpu;
-}
-
 PreparedMap map_of(const Room& room) {
   MapBuilder builder(MapOptions{0.05f});
   builder.add_scan(context(), room.seen_from(kMapSensor).view(), UnalignedIsometry3d::Identity());

@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "support/cpu_context.hpp"
 #include "support/expect_error.hpp"
 
 namespace gpureg::test {
@@ -117,11 +118,6 @@ std::vector<Body> three_parts() {
 Body clutter(double turn, const Eigen::Vector3d& at) {
   return {{{{0, 0, .02}, {.02, .015, .02}}, {{.02, .02, .01}, {.03, .01, .01}}},
           placed(turn, 0, at)};
-}
-
-const Context& context() {
-  static const Context cpu = Context::cpu(2);
-  return cpu;
 }
 
 /// Displacement of the part's far corner, metres.

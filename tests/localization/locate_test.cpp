@@ -9,11 +9,6 @@ namespace {
 // Sampled at random, a surface of 10 cm voxels is known to about a centimetre.
 constexpr double kClose = 0.05;
 
-const Context& context() {
-  static const Context cpu = Context::cpu(2);
-  return cpu;
-}
-
 TEST(Locate, FindsAScanInItsRoomAndSaysWhereItIsNot) {
   const PreparedMap map = building({1, 2, 3, 4}, map_options());
   EXPECT_EQ(map.tiles(), 1u);

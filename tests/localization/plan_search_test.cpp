@@ -16,11 +16,6 @@ using localization::FloorPlan;
 using localization::MapState;
 using localization::Scan;
 
-const Context& context() {
-  static const Context cpu = Context::cpu(2);
-  return cpu;
-}
-
 /// A place of the plan is off by a cell, of two voxels.
 constexpr double kOfCell = 0.3;
 
@@ -40,17 +35,6 @@ double error(const Query& query, const Candidate& place) {
   LocatedPose pose;
   pose.map_from_scan = place.map_from_scan;
   return query.error(pose);
-}
-
-std::vector<double> numbers_of(const std::vector<Candidate>& places) {
-  std::vector<double> out;
-  for (const Candidate& place : places) {
-    const Eigen::Matrix4d pose = place.map_from_scan.matrix();
-    out.insert(out.end(), pose.data(), pose.data() + pose.size());
-    out.push_back(place.confidence);
-    out.push_back(place.agreeing);
-  }
-  return out;
 }
 
 TEST(FrequentAxes, AreThoseOfTheNormalsUpToTheSign) {

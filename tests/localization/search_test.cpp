@@ -13,11 +13,6 @@ namespace {
 using localization::MapState;
 using localization::Scan;
 
-const Context& context() {
-  static const Context cpu = Context::cpu(2);
-  return cpu;
-}
-
 /// Six rooms in so many tiles that coarser voxels, of 20 cm, choose some of them.
 class LargeMap : public testing::Test {
  protected:

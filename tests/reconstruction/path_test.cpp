@@ -14,18 +14,18 @@ namespace {
 
 using namespace reconstruction;
 
-constexpr std::uint32_t kScans = 40, kBay = 14, kSecond = 26;
+constexpr std::uint32_t kStations = 40, kBay = 14, kSecond = 26;
 
 std::vector<Eigen::Vector3d> sensors() {
-  return std::vector<Eigen::Vector3d>(kScans, Eigen::Vector3d::Zero());
+  return std::vector<Eigen::Vector3d>(kStations, Eigen::Vector3d::Zero());
 }
 
 /// A path through two bays that look alike: scans 0 to 13 and 26 to 39, of which those 26 numbers
 /// apart see the same. One step between the bays is registered hardly, and the many aliases agree.
 struct TwinBays : PairResults {
   explicit TwinBays(const std::vector<std::uint32_t>& number) : PairResults(0) {
-    world_from_scan.resize(kScans);
-    for (std::uint32_t k = 0; k < kScans; ++k) {
+    world_from_scan.resize(kStations);
+    for (std::uint32_t k = 0; k < kStations; ++k) {
       UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
       pose.translation().x() = k;
       pose.rotate(Eigen::AngleAxisd(0.2 * k, Eigen::Vector3d::UnitZ()));
@@ -35,8 +35,8 @@ struct TwinBays : PairResults {
       const UnalignedIsometry3d& moved = world_from_scan[number[source - kSecond]];
       return UnalignedIsometry3d(world_from_scan[number[target]].inverse() * moved);
     };
-    for (std::uint32_t t = 0; t < kScans; ++t)
-      for (std::uint32_t s = t + 1; s < kScans; ++s) {
+    for (std::uint32_t t = 0; t < kStations; ++t)
+      for (std::uint32_t s = t + 1; s < kStations; ++s) {
         const bool twins = t < kBay && s >= kSecond && s - kSecond + 2 >= t && s - kSecond <= t + 2;
         if (s - t <= 2)
           add_correct(number[s], number[t], s == 20 || t == 20 ? 0.6 : 0.99);
@@ -64,21 +64,21 @@ struct TwinBays : PairResults {
     return pairs_along_the_path(sensors(), pairs, results, {});
   }
 
-  bool look_alike() const { return look_alike(reconstruct_from_poses(kScans, pairs, results)); }
+  bool look_alike() const { return look_alike(reconstruct_from_poses(kStations, pairs, results)); }
   bool look_alike(const Reconstruction& map) const {
     return places_look_alike(map, sensors(), pairs, results);
   }
 };
 
 std::vector<std::uint32_t> in_order() {
-  std::vector<std::uint32_t> number(kScans);
+  std::vector<std::uint32_t> number(kStations);
   std::iota(number.begin(), number.end(), 0u);
   return number;
 }
 
 TEST(Path, AliasesCollapseAMapAndShow) {
   const TwinBays set(in_order());
-  const Reconstruction map = reconstruct_from_poses(kScans, set.pairs, set.results);
+  const Reconstruction map = reconstruct_from_poses(kStations, set.pairs, set.results);
   EXPECT_GT(set.wrong_edges(map), 10u);
   EXPECT_TRUE(set.look_alike(map));
 }
@@ -92,7 +92,7 @@ TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
 
 TEST(Path, FewRejectedPairsOfManySayNothing) {
   Reconstruction map;
-  map.scans.resize(kScans);
+  map.scans.resize(kStations);
   map.edges.resize(500);
   const auto look_alike = [&](std::size_t rejected) {
     for (std::size_t k = 0; k < map.edges.size(); ++k) {
@@ -109,7 +109,7 @@ TEST(Path, FewRejectedPairsOfManySayNothing) {
 /// Of 400 pairs of 40 scans so many are rejected, all with a confidence that says little.
 bool rejected_of_400_look_alike(std::size_t rejected) {
   Reconstruction map;
-  map.scans.resize(kScans);
+  map.scans.resize(kStations);
   for (Scan& scan : map.scans) scan.placed = true;
   map.edges.resize(400);
   for (std::size_t k = 0; k < map.edges.size(); ++k) {
@@ -129,10 +129,10 @@ TEST(Path, ManyRejectedPairsOfLittleConfidenceShowAliasesToo) {
 
 /// A map of all scans at two places, as aliases make it, without any rejected pair.
 bool folded_path_looks_alike(const TwinBays& set) {
-  Reconstruction map = reconstruct_from_poses(kScans, set.pairs, set.results);
+  Reconstruction map = reconstruct_from_poses(kStations, set.pairs, set.results);
   map.islands.resize(1);
   for (Edge& edge : map.edges) edge.accepted = true;
-  for (std::uint32_t k = 0; k < kScans; ++k) {
+  for (std::uint32_t k = 0; k < kStations; ++k) {
     map.scans[k].placed = true;
     map.scans[k].island = 0;
     map.scans[k].island_from_scan = set.world_from_scan[k];
@@ -155,16 +155,16 @@ TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
     EXPECT_EQ(trusted[k] != 0, gap <= 4) << set.pairs[k].target << " " << set.pairs[k].source;
     if (!trusted[k]) set.results[k].has_candidate = false;
   }
-  const Reconstruction map = reconstruct_from_poses(kScans, set.pairs, set.results);
+  const Reconstruction map = reconstruct_from_poses(kStations, set.pairs, set.results);
   EXPECT_EQ(set.wrong_edges(map), 0u);
   ASSERT_FALSE(map.islands.empty());
-  EXPECT_GE(map.islands[0].scans.size(), kScans - 1);
+  EXPECT_GE(map.islands[0].scans.size(), kStations - 1);
 }
 
 /// A permutation in which no numbers that follow each other are neighbours.
 std::vector<std::uint32_t> in_any_order() {
-  std::vector<std::uint32_t> number(kScans);
-  for (std::uint32_t k = 0; k < kScans; ++k) number[k] = (17 * k + 5) % 40;
+  std::vector<std::uint32_t> number(kStations);
+  for (std::uint32_t k = 0; k < kStations; ++k) number[k] = (17 * k + 5) % 40;
   return number;
 }
 

@@ -23,7 +23,7 @@ std::string matrix(const char* name, int rows, int columns, const std::string& d
 }
 
 const std::string kHead = "%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\n";
-const std::string kCamera = matrix("camera_matrix", 3, 3, "60., 0., 31., 0., 61., 24., 0., 0., 1.");
+const std::string kMatrix = matrix("camera_matrix", 3, 3, "60., 0., 31., 0., 61., 24., 0., 0., 1.");
 
 std::string message_of(const std::string& path) {
   Rig rig;
@@ -38,7 +38,7 @@ std::string message_of(const std::string& path) {
 TEST(CameraFile, DistortionIsTakenOut) {
   const TemporaryFolder folder;
   folder.write("camera.yaml",
-               kHead + kCamera + "depth_units: 1000\n" +
+               kHead + kMatrix + "depth_units: 1000\n" +
                    matrix("distortion_coefficients", 1, 5, "0.2, -0.1, 0.01, -0.02, 0.05"));
   Rig rig;
   read_camera(folder / "camera.yaml", rig);
@@ -78,7 +78,7 @@ TEST(CameraFile, DistortionIsTakenOut) {
 TEST(CameraFile, TheDepthCamera) {
   const TemporaryFolder folder;
   folder.write("camera.yaml",
-               kHead + kCamera +
+               kHead + kMatrix +
                    matrix("depth_camera_matrix", 3, 3, "50., 0., 32., 0., 51., 24., 0., 0., 1.") +
                    matrix("colour_from_depth", 4, 4,
                           "1., 0., 0., .025, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1."));
@@ -96,11 +96,11 @@ TEST(CameraFile, WhatIsWrongIsNamed) {
   for (const auto& [text, named] :
        {std::pair<std::string, std::string>{"no yaml: [", "FileStorage"},
         {kHead, "camera_matrix"},
-        {"%YAML:1.0\n---\n" + kCamera, "image_width"},
+        {"%YAML:1.0\n---\n" + kMatrix, "image_width"},
         {kHead + matrix("camera_matrix", 1, 2, "1., 2."), "3 x 3"},
         {kHead + matrix("camera_matrix", 3, 3, "0., 0., 31., 0., 61., 24., 0., 0., 1."), "focal"},
-        {kHead + kCamera + matrix("distortion_coefficients", 1, 3, "0.2, -0.1, 0.01"), "4, 5 or 8"},
-        {kHead + kCamera + "depth_units: -1\n", "depth_units"}}) {
+        {kHead + kMatrix + matrix("distortion_coefficients", 1, 3, "0.2, -0.1, 0.01"), "4, 5 or 8"},
+        {kHead + kMatrix + "depth_units: -1\n", "depth_units"}}) {
     folder.write("camera.yaml", text);
     const std::string message = message_of(path);
     EXPECT_NE(message.find("camera.yaml"), std::string::npos) << text;
@@ -136,7 +136,7 @@ TEST(CameraFile, PublishedCamerasAreKnownByName) {
   std::ofstream(root / "data/rgb.txt")
       << "# color images\n# file: 'rgbd_dataset_freiburg1_rpy.bag'\n1 c.png\n";
   EXPECT_EQ(open_sequence((root / "data").string()).rig.colour.cy, 255.3) << "the bag's name";
-  std::ofstream(root / "data/camera.yaml") << kHead << kCamera;
+  std::ofstream(root / "data/camera.yaml") << kHead << kMatrix;
   EXPECT_EQ(open_sequence((root / "data").string()).rig.colour.fx, 60) << "the file replaces it";
 }
 

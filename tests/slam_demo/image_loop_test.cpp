@@ -5,14 +5,10 @@
 
 #include <random>
 
+#include "slam_demo/pose_at.hpp"
+
 namespace slam_demo {
 namespace {
-
-Eigen::Isometry3d at(double x, double y, double z, double turn = 0) {
-  Eigen::Isometry3d pose(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()));
-  pose.translation() = Eigen::Vector3d(x, y, z);
-  return pose;
-}
 
 /// 60 points on a curved wall, and keyframes that see all of them.
 struct Wall {

@@ -5,6 +5,7 @@
 
 #include "mapping/bundle.hpp"
 #include "mapping/keyframe_graph.hpp"
+#include "slam_demo/pose_at.hpp"
 
 namespace slam_demo {
 namespace {
@@ -16,12 +17,6 @@ std::shared_ptr<Features> features(std::size_t count) {
   f->depth.assign(count, 1.0f);
   f->index();
   return f;
-}
-
-Eigen::Isometry3d at(double x, double y, double z, double turn = 0) {
-  Eigen::Isometry3d pose(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()));
-  pose.translation() = Eigen::Vector3d(x, y, z);
-  return pose;
 }
 
 int add(Map& map, const Eigen::Isometry3d& pose, int session = 0, std::size_t count = 10) {

@@ -18,7 +18,7 @@ namespace {
 using gpureg::test::expect_error;
 using nlohmann::json;
 
-constexpr Pinhole kCamera{500, 510, 320, 240};
+constexpr Pinhole kPinhole{500, 510, 320, 240};
 
 std::vector<json> lines_of(const gpureg::test::TemporaryFolder& folder) {
   std::istringstream text(gpureg::test::content_of(folder / "progress.jsonl"));
@@ -56,7 +56,7 @@ LoopRecord loop_of(const std::string& state) {
 
 TEST(Progress, WritesEachChangeOnce) {
   const gpureg::test::TemporaryFolder folder;
-  Progress progress(folder.path(), kCamera);
+  Progress progress(folder.path(), kPinhole);
   Map map;
   progress.update(0, map, {}, {});
   add_keyframe(map, 2);
@@ -111,7 +111,7 @@ TEST(Progress, WritesEachChangeOnce) {
 
 TEST(Progress, FewPointsOfAKeyframe) {
   const gpureg::test::TemporaryFolder folder;
-  Progress progress(folder.path(), kCamera);
+  Progress progress(folder.path(), kPinhole);
   Map map;
   add_keyframe(map, 999);
   map.points[0].bad = true;
@@ -124,33 +124,33 @@ TEST(Progress, FewPointsOfAKeyframe) {
 TEST(Progress, ANewRunReplacesTheFileOfAnOldOne) {
   const gpureg::test::TemporaryFolder folder;
   folder.write("progress.jsonl", std::string(1000, '-'));
-  const Progress progress(folder.path(), kCamera);
+  const Progress progress(folder.path(), kPinhole);
   EXPECT_EQ(lines_of(folder).size(), 1u);
 }
 
 TEST(Progress, TwoRunsDoNotShareAFolder) {
   const gpureg::test::TemporaryFolder folder;
   {
-    const Progress progress(folder.path(), kCamera);
-    expect_error<gpureg::IoError>([&] { Progress(folder.path(), kCamera); },
+    const Progress progress(folder.path(), kPinhole);
+    expect_error<gpureg::IoError>([&] { Progress(folder.path(), kPinhole); },
                                   {folder / "progress.jsonl", "another run writes to this folder"});
     EXPECT_EQ(lines_of(folder).size(), 1u) << "the file of the first run stays";
   }
-  EXPECT_NO_THROW(Progress(folder.path(), kCamera));
+  EXPECT_NO_THROW(Progress(folder.path(), kPinhole));
 }
 
 TEST(Progress, NoFolder) {
   const gpureg::test::TemporaryFolder folder;
   const std::string file = folder.write("file", "");
-  expect_error<gpureg::IoError>([&] { Progress(file + "/out", kCamera); },
+  expect_error<gpureg::IoError>([&] { Progress(file + "/out", kPinhole); },
                                 {"cannot make this folder"});
   std::filesystem::create_directories(folder / "out/progress.jsonl");
-  expect_error<gpureg::IoError>([&] { Progress(folder / "out", kCamera); }, {"cannot be written"});
+  expect_error<gpureg::IoError>([&] { Progress(folder / "out", kPinhole); }, {"cannot be written"});
 }
 
 TEST(Progress, AFullDiskEndsTheFileAndNotTheRun) {
   const gpureg::test::TemporaryFolder folder;
-  Progress progress(folder.path(), kCamera);
+  Progress progress(folder.path(), kPinhole);
   {
     const gpureg::test::LimitedFileSize limit(100);
     Map map;

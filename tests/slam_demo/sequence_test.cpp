@@ -33,7 +33,7 @@ void write_images(const fs::path& colour, const fs::path& depth, int value) {
   cv::imwrite(depth.string(), cv::Mat1w(48, 64, static_cast<std::uint16_t>(value)));
 }
 
-std::string message_of(const std::string& folder) {
+std::string refusal_of(const std::string& folder) {
   try {
     open_sequence(folder);
   } catch (const gpureg::IoError& error) {
@@ -235,7 +235,7 @@ TEST(Sequence, SeveralLogs) {
   };
   write(folder / "b.log", log(2));
   write(folder / "a.log", log(1));
-  const std::string message = message_of(folder.path());
+  const std::string message = refusal_of(folder.path());
   EXPECT_NE(message.find("a.log and "), std::string::npos) << message;
   EXPECT_NE(message.find("b.log: only one"), std::string::npos) << message;
   write(folder / "trajectory.log", log(3));
@@ -245,7 +245,7 @@ TEST(Sequence, SeveralLogs) {
   write(tum / "associations.txt", "1 depth/1.png 1 rgb/1.png\n");
   write(tum / "a.gt.freiburg", "1 0 0 5 0 0 0 1\n");
   write(tum / "b.gt.freiburg", "1 0 0 5 0 0 0 1\n");
-  EXPECT_NE(message_of(tum.path()).find("a.gt.freiburg and "), std::string::npos);
+  EXPECT_NE(refusal_of(tum.path()).find("a.gt.freiburg and "), std::string::npos);
 }
 
 // Programs that show windows set the user's locale, in which 1.5 may be 1,5.
@@ -265,15 +265,15 @@ TEST(Sequence, NumbersDoNotDependOnTheLocale) {
 
 TEST(Sequence, ErrorsNameTheFile) {
   const TemporaryFolder folder;
-  EXPECT_NE(message_of(folder / "nowhere").find("nowhere"), std::string::npos);
-  EXPECT_NE(message_of(folder.path()).find("no frames"), std::string::npos);
+  EXPECT_NE(refusal_of(folder / "nowhere").find("nowhere"), std::string::npos);
+  EXPECT_NE(refusal_of(folder.path()).find("no frames"), std::string::npos);
   write(folder / "associations.txt", "1 rgb/1.png 1\n");
-  EXPECT_NE(message_of(folder.path()).find("associations.txt:1"), std::string::npos);
+  EXPECT_NE(refusal_of(folder.path()).find("associations.txt:1"), std::string::npos);
   write(folder / "associations.txt", "one rgb/1.png 1 depth/1.png\n");
-  EXPECT_NE(message_of(folder.path()).find("'one'"), std::string::npos);
+  EXPECT_NE(refusal_of(folder.path()).find("'one'"), std::string::npos);
   write(folder / "associations.txt", "1 rgb/1.png 1 depth/1.png\n");
   write(folder / "groundtruth.txt", "1 2 3\n");
-  EXPECT_NE(message_of(folder.path()).find("groundtruth.txt:1"), std::string::npos);
+  EXPECT_NE(refusal_of(folder.path()).find("groundtruth.txt:1"), std::string::npos);
 }
 
 }  // namespace

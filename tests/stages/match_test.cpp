@@ -9,7 +9,7 @@
 namespace gpureg::cpu {
 namespace {
 
-struct Rows {
+struct ValidRows {
   std::vector<float> values;
   std::vector<std::uint8_t> valid;
   FeatureRows view(std::uint32_t dimension) const {
@@ -17,8 +17,8 @@ struct Rows {
   }
 };
 
-Rows random_rows(std::mt19937& random, std::size_t n, std::uint32_t dimension, bool coarse) {
-  Rows rows;
+ValidRows random_rows(std::mt19937& random, std::size_t n, std::uint32_t dimension, bool coarse) {
+  ValidRows rows;
   std::uniform_real_distribution<float> value(0, 100);
   for (std::size_t k = 0; k < n * dimension; ++k)
     rows.values.push_back(coarse ? std::floor(value(random) / 40) : value(random));
@@ -27,7 +27,7 @@ Rows random_rows(std::mt19937& random, std::size_t n, std::uint32_t dimension, b
 }
 
 /// The definition: a chain of fused multiply-adds over the dimensions, ties to the lower index.
-std::vector<std::uint32_t> by_definition(const Rows& queries, const Rows& rows,
+std::vector<std::uint32_t> by_definition(const ValidRows& queries, const ValidRows& rows,
                                          std::uint32_t dimension, std::uint32_t k) {
   std::vector<std::uint32_t> out;
   for (std::size_t q = 0; q < queries.valid.size(); ++q) {
@@ -52,8 +52,8 @@ TEST(NearestFeatures, IsTheDefinitionForAnyDimensionAndCount) {
     for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(3), std::size_t(16),
                                 std::size_t(17), std::size_t(150)})
       for (const std::uint32_t k : {1u, 2u, 16u}) {
-        const Rows queries = random_rows(random, 37, dimension, false),
-                   rows = random_rows(random, n, dimension, n % 2 == 0);
+        const ValidRows queries = random_rows(random, 37, dimension, false),
+                        rows = random_rows(random, n, dimension, n % 2 == 0);
         std::vector<std::uint32_t> out(37 * k);
         nearest_features(queries.view(dimension), rows.view(dimension), k, 0, 37, out.data());
         EXPECT_EQ(out, by_definition(queries, rows, dimension, k))
@@ -63,7 +63,8 @@ TEST(NearestFeatures, IsTheDefinitionForAnyDimensionAndCount) {
 
 TEST(NearestFeatures, TiesGoToTheLowerIndex) {
   std::mt19937 random(2);
-  const Rows queries = random_rows(random, 200, 2, true), rows = random_rows(random, 400, 2, true);
+  const ValidRows queries = random_rows(random, 200, 2, true),
+                  rows = random_rows(random, 400, 2, true);
   std::vector<std::uint32_t> out(200 * 5);
   nearest_features(queries.view(2), rows.view(2), 5, 0, 200, out.data());
   EXPECT_EQ(out, by_definition(queries, rows, 2, 5));
@@ -71,8 +72,8 @@ TEST(NearestFeatures, TiesGoToTheLowerIndex) {
 
 TEST(NearestFeatures, AnySplitOfTheQueriesIsTheSame) {
   std::mt19937 random(3);
-  const Rows queries = random_rows(random, 101, 33, false),
-             rows = random_rows(random, 300, 33, false);
+  const ValidRows queries = random_rows(random, 101, 33, false),
+                  rows = random_rows(random, 300, 33, false);
   std::vector<std::uint32_t> whole(101), parts(101);
   nearest_features(queries.view(33), rows.view(33), 1, 0, 101, whole.data());
   for (std::size_t begin = 0; begin < 101; begin += 7)

@@ -28,14 +28,14 @@ Eigen::Matrix3d principal_axes(const Trajectory& trajectory) {
 }
 
 /// A number with few digits: the page draws it.
-double rounded(double metres) { return std::round(1000 * metres) / 1000; }
+double to_millimetres(double metres) { return std::round(1000 * metres) / 1000; }
 
 json line_of(const char* name, const char* colour, const Trajectory& trajectory,
              const Eigen::Matrix4d& move) {
   json points = json::array();
   for (const ev::StampedPose& pose : trajectory) {
     const Eigen::Vector4d p = move * pose.world_from_body.col(3);
-    points.push_back({rounded(p.x()), rounded(p.y())});
+    points.push_back({to_millimetres(p.x()), to_millimetres(p.y())});
   }
   return {{"name", name}, {"colour", colour}, {"points", points}};
 }
@@ -43,7 +43,7 @@ json line_of(const char* name, const char* colour, const Trajectory& trajectory,
 json errors_of(const char* colour, const ev::TrajectoryEvaluation& e) {
   json points = json::array();
   for (const ev::PoseError& pose : e.poses)
-    points.push_back({rounded(pose.time), std::round(1e5 * pose.metres) / 1e5});
+    points.push_back({to_millimetres(pose.time), std::round(1e5 * pose.metres) / 1e5});
   return {{"colour", colour}, {"points", points}};
 }
 

@@ -15,11 +15,11 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kScans = 10;
-
 /// A calibration of scans of a room, and files written by hand.
 class CalibrateVerb : public ::testing::Test {
  protected:
+  static constexpr int kScans = 10;
+
   static json good() {
     return {{"format_version", 1},
             {"gpureg", "calibration"},
