@@ -48,8 +48,19 @@ launcher_arguments() {
   fi
 }
 
-# The same, and several builds of one checkout share the objects of the libraries: ccache takes none for that of another build where the
-# two have a precompiled header each, or where the wheel compiles several sources at a time.
+# ccache knows the files that CMake makes in one build folder again in another one.
+export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$PWD/build}
+
+# For builds of single sources that share the objects of the libraries: for work on them.
 shared_objects() {
   if command -v ccache > /dev/null; then echo "$(launcher_arguments) -DGPUREG_PRECOMPILED_LIBRARIES=OFF -DCMAKE_UNITY_BUILD=OFF"; fi
+}
+
+# For scripts/test: from nothing, several sources compile at a time, in half the time. A build folder of single sources stays one.
+whole_build() {
+  if grep -qs '^CMAKE_UNITY_BUILD:.*=OFF' build/cpu/CMakeCache.txt; then
+    shared_objects
+  else
+    echo "$(launcher_arguments) -DCMAKE_UNITY_BUILD=ON"
+  fi
 }
