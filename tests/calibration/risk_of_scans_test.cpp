@@ -74,21 +74,21 @@ TEST(RiskOfScans, OneBadScanCountsOnceInARound) {
 }
 
 TEST(RiskOfScans, PairsOfAGroupAreDisjointFromThoseOfOthers) {
-  constexpr std::uint32_t kGroups = 8, kScans = 12;
+  constexpr std::uint32_t kGroups = 8, kOfGroup = 12;
   Samples samples;
-  std::vector<std::uint32_t> groups(kGroups * kScans + 1, kNoScanGroup);
+  std::vector<std::uint32_t> groups(kGroups * kOfGroup + 1, kNoScanGroup);
   for (std::uint32_t g = 0; g < kGroups; ++g)
-    for (std::uint32_t j = 0; j < kScans; ++j) {
-      groups[g * kScans + j] = 10 * g;
+    for (std::uint32_t j = 0; j < kOfGroup; ++j) {
+      groups[g * kOfGroup + j] = 10 * g;
       for (std::uint32_t i = 0; i < j; ++i)
-        samples.push_back(pair(g * kScans + i, g * kScans + j, 0.65));
+        samples.push_back(pair(g * kOfGroup + i, g * kOfGroup + j, 0.65));
     }
   RiskControl control;
   control.max_risk = 0.1;
   const RiskThreshold found = control_risk_of_scans(samples, groups, control);
   EXPECT_TRUE(found.supported) << "as 96 scans of which all pairs were aligned";
   EXPECT_EQ(found.min_confidence, 0.05);
-  EXPECT_EQ(found.scans, kGroups * kScans);
+  EXPECT_EQ(found.scans, kGroups * kOfGroup);
   EXPECT_EQ(found.reported, samples.size());
   EXPECT_EQ(found.recall, 1);
   std::reverse(samples.begin(), samples.end());
