@@ -54,7 +54,7 @@ std::string in_option_names(std::string message) {
   const std::array<std::pair<const char*, std::string>, 6> names{{
       {"suggest_voxel_size()", "--voxel-size auto"},
       {"voxel_size", voxel_size_option()},
-      {"min_confidence", "--min-score"},
+      {"min_confidence", "--min-confidence"},
       {"accept_symmetry", "--set accept_symmetry=true"},
       {"loop_consistency()", "`gpureg consistency`"},
       {"a RegistrationPrior", "--up"},

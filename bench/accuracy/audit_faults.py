@@ -147,7 +147,7 @@ def false_loops(chosen, places):
         pose = np.reshape(pair["T_ij"], (4, 4))
         error = np.linalg.inv(chosen.poses[i]) @ chosen.poses[j] @ np.linalg.inv(pose)
         if np.linalg.norm(error[:3, 3]) > WRONG_METRES or angle(error[:3, :3]) > WRONG_DEGREES:
-            wrong.append((pair["score"], i, j, pose))
+            wrong.append((pair["confidence"], i, j, pose))
     for _, i, j, pose in sorted(wrong, key=lambda w: -w[0])[:places]:
         between = [k for k in chosen.order if i <= k <= j]
         want = chosen.poses[i] @ pose @ np.linalg.inv(chosen.poses[j])  # of the world beyond j

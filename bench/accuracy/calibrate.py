@@ -177,7 +177,7 @@ def results_of(arguments, kind, folder, voxel_size, calibration):
             continue
         verdict = verdict_of(pair["i"], pair["j"], np.array(pair["T_ij"]).reshape(4, 4))
         if verdict is not None:
-            out.append((pair["score"], verdict))
+            out.append((pair["confidence"], verdict))
     return np.array(out, np.float64)
 
 

@@ -41,7 +41,7 @@ def figures(folder, result, temporary):
     # Without gt_all.log the strict rule is the only one.
     rule = "geometric" if "geometric" in scene else "strict"
     score = scene[rule]
-    pairs = [(pair["score"] or 0.0, pair[rule]) for pair in scene["pairs"] if pair["tried"]]
+    pairs = [(pair["confidence"] or 0.0, pair[rule]) for pair in scene["pairs"] if pair["tried"]]
     error = 0.0
     for k in range(CALIBRATION_BINS):
         inside = [
@@ -79,7 +79,7 @@ def closing(folder, result):
     world = {int(rows[k][0]): np.array(rows[k + 1 : k + 5], float) for k in range(0, len(rows), 5)}
     poses, correct = {}, {}
     for pair in json.loads(pathlib.Path(result).read_text())["pairs"]:
-        if (pair["score"] or 0.0) > MIN_CONFIDENCE:
+        if (pair["confidence"] or 0.0) > MIN_CONFIDENCE:
             key = pair["i"], pair["j"]
             poses[key] = np.array(pair["T_ij"], float).reshape(4, 4)
             turn, shift = off(poses[key] @ np.linalg.inv(world[key[1]]) @ world[key[0]])

@@ -62,7 +62,7 @@ def building(text):
             continue
         correct = verdict(pair["i"], pair["j"], np.reshape(pair["T_ij"], (4, 4)))
         if correct is not None:
-            rows.append((pair["score"], correct))
+            rows.append((pair["confidence"], correct))
     return np.array(rows, float)
 
 

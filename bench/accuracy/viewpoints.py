@@ -383,7 +383,7 @@ def run(command, scene, seed, rng, condition, total, extra):
         total["reported_wrong"] += reported and not good
         total["reported_up_to_symmetry"] += up_to_symmetry and good
         total["reported_up_to_symmetry_wrong"] += up_to_symmetry and not good
-        outcomes.append((pose, good, record["score"]))
+        outcomes.append((pose, good, record["confidence"]))
     return document["options"]["voxel_size"], outcomes
 
 

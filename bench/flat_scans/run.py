@@ -82,7 +82,7 @@ def batch(arguments, folder, seed, result, *words):
         log = pathlib.Path(temporary) / "pairs.log"
         record.gpureg(
             arguments, "batch", folder, "-o", log, "--json", result,
-            "--voxel-size", arguments.voxel_size, "--seed", seed, "--min-score", 0, "--quiet",
+            "--voxel-size", arguments.voxel_size, "--seed", seed, "--min-confidence", 0, "--quiet",
             "--backend", arguments.backend, *words,
         )  # fmt: skip
 
@@ -103,7 +103,7 @@ def results(arguments, folder, seed, *words):
             points = scans[pair["j"]]
             error = moved(found, points) - moved(i_from_j, points)
             correct = np.sqrt((error**2).sum(1).mean()) <= CORRECT
-        rows.append((pair["score"], correct, overlap >= OVERLAP, pair["ms"]["total"]))
+        rows.append((pair["confidence"], correct, overlap >= OVERLAP, pair["ms"]["total"]))
     return rows
 
 

@@ -69,9 +69,8 @@ Sequence read_sequence(const std::string& path) {
       pair.result.modes.push_back(mode);
     }
     if (modes > 0) {
-      pair.result.has_candidate = true;
       pair.result.target_from_source = pair.result.modes[0].target_from_source;
-      pair.result.score = pair.result.modes[0].confidence;
+      pair.result.confidence = pair.result.modes[0].confidence;
     }
     out.pairs.push_back(pair);
   }
@@ -80,7 +79,7 @@ Sequence read_sequence(const std::string& path) {
   for (const RegisteredPair& pair : out.pairs) {
     const int late = std::max(pair.source, pair.target), early = std::min(pair.source, pair.target);
     if (late - early < kRevisitGap || pair.overlap < kRevisitOverlap || late >= best ||
-        pair.result.modes.empty() || pair.result.score < 0.5 ||
+        pair.result.modes.empty() || pair.result.confidence < 0.5 ||
         !correct(truth_of(out, pair.source, pair.target), pair.result.target_from_source))
       continue;
     best = late;
@@ -202,10 +201,10 @@ std::vector<Trial> trials(const Sequence& sequence, std::size_t most, double fal
       trial.result = pair.result;
       trial.result.modes = {pair.result.modes[m]};
       trial.result.target_from_source = trial.result.modes[0].target_from_source;
-      trial.result.score = trial.result.modes[0].confidence;
+      trial.result.confidence = trial.result.modes[0].confidence;
       trial.is_true =
           correct(truth_of(sequence, pair.source, pair.target), trial.result.target_from_source);
-      if (m == 0 && trial.is_true && trial.result.score >= 0.5) good.push_back(trial);
+      if (m == 0 && trial.is_true && trial.result.confidence >= 0.5) good.push_back(trial);
       if (m == 0 && !trial.is_true) wrong.push_back(trial);
     }
   }
@@ -216,14 +215,15 @@ std::vector<Trial> trials(const Sequence& sequence, std::size_t most, double fal
       std::llround(false_share / (1 - false_share) * static_cast<double>(good.size())));
   if (count > wrong.size()) return {};
   // The most confident wrong poses are the hard ones.
-  std::stable_sort(wrong.begin(), wrong.end(),
-                   [](const Trial& a, const Trial& b) { return a.result.score > b.result.score; });
+  std::stable_sort(wrong.begin(), wrong.end(), [](const Trial& a, const Trial& b) {
+    return a.result.confidence > b.result.confidence;
+  });
   wrong.resize(count);
   std::vector<Trial> out = good;
   for (Trial& trial : wrong) {
     if (shuffled) {
-      const double confidence = good[random() % good.size()].result.score;
-      trial.result.score = trial.result.modes[0].confidence = confidence;
+      const double confidence = good[random() % good.size()].result.confidence;
+      trial.result.confidence = trial.result.modes[0].confidence = confidence;
     }
     out.push_back(trial);
   }

@@ -124,7 +124,7 @@ void run(const gpureg::Context& context, std::size_t wanted, bool with_viewpoint
       "\"align_s\": %.2f, "
       "\"match_ms\": %.1f, \"confidence\": %.3f, \"error_m\": %.3f, \"host_gib\": %.1f",
       map.size(), map_viewpoints.size(), static_cast<std::size_t>(target.size()), prepared, aligned,
-      result.timings.match, result.score,
+      result.timings.match, result.confidence,
       (result.target_from_source * middle - truth * middle).norm(), peak_gib());
   const gpureg::PrepareStatistics& stages = target.statistics();
   std::printf(

@@ -40,7 +40,7 @@ def figures(scene, context):
     scale = {}
     for (s, t, truth), r in zip(asked, results):
         points = scene.clouds[s].points[::50]
-        if r.result.has_candidate and scene.right(
+        if r.result.has_pose and scene.right(
             points, rigid_at(points, r.target_from_source), [truth]
         ):
             scale[s, t] = 100 * np.log(r.scale)

@@ -118,18 +118,18 @@ def run(name, scenes, limit, seed, condition, context):
             )
             seconds[0] += middle - begin
             seconds[1] += time.perf_counter() - middle
-            of_known = correct(np.asarray(a.target_from_source)) if a.has_candidate else False
-            known.append((a.score, of_known, a.aligned))
+            of_known = correct(np.asarray(a.target_from_source)) if a.has_pose else False
+            known.append((a.confidence, of_known, a.aligned))
             error = abs(b.scale / factor - 1)
             to_source = np.diag([1 / factor, 1 / factor, 1 / factor, 1])
-            found = b.result.has_candidate and correct(b.target_from_source @ to_source)
+            found = b.result.has_pose and correct(b.target_from_source @ to_source)
             found = found and error < 0.1
             searched.append((b.confidence, found, b.aligned))
             statuses[b.scale_status] = statuses.get(b.scale_status, 0) + 1
             if found:
                 errors.append(float(np.log(b.scale / factor)))
             print(
-                f"{name} {condition} {seed}: {s} {t} factor {factor:.3g}, known {of_known} {a.score:.3f}, "
+                f"{name} {condition} {seed}: {s} {t} factor {factor:.3g}, known {of_known} {a.confidence:.3f}, "
                 f"searched {found} {b.confidence:.3f} {b.scale_status}, error {error:.4f}, "
                 f"{middle - begin:.2f} s and {time.perf_counter() - middle:.2f} s",
                 flush=True,

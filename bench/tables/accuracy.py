@@ -175,7 +175,7 @@ CONDITIONS = {
     "still": "not moved, nothing given",
 }
 
-DECISIONS = ("said", "origin", "normals", "none", "model")
+DECISIONS = ("given", "origin", "normals", "none", "model")
 
 
 def span(runs, key):

@@ -23,7 +23,7 @@ int main(int argc, char** argv) try {
 
   const auto result = gpureg::align(context, source.view(), target.view(), options);
   std::cout << context.description() << ": " << explain(result.reason) << "\n"
-            << "score " << result.score << "\n";
+            << "confidence " << result.confidence << "\n";
   if (!result.aligned()) return 1;
 
   // p_target = target_from_source * p_source

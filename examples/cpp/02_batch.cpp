@@ -36,8 +36,8 @@ int main(int argc, char** argv) try {
   // Called once per pair, in the order of the pairs.
   gpureg::BatchCallbacks callbacks;
   callbacks.on_result = [&](std::size_t k, const gpureg::RegistrationResult& result) {
-    std::printf("%u into %u: %s, score %.3f\n", pairs[k].source, pairs[k].target,
-                to_string(result.status), result.score);
+    std::printf("%u into %u: %s, confidence %.3f\n", pairs[k].source, pairs[k].target,
+                to_string(result.status), result.confidence);
   };
   const auto results = gpureg::align_batch(context, prepared, pairs, options, callbacks);
 

@@ -26,7 +26,7 @@ int main(int argc, char** argv) try {
   // The functions of gpureg on views of the clouds. sensor_origin_ becomes the viewpoint.
   const auto result = gpureg::align(gpureg::Context::best(), gpureg::view_of(*source),
                                     gpureg::view_of(*target), options);
-  std::cout << explain(result.reason) << "\nscore " << result.score << "\n";
+  std::cout << explain(result.reason) << "\nconfidence " << result.confidence << "\n";
 
   // The interface of pcl::Registration, for programs that already call one of PCL's algorithms.
   gpureg::PclRegistration<pcl::PointXYZ> registration(options);

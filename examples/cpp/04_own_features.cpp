@@ -61,7 +61,7 @@ int main(int argc, char** argv) try {
   const auto source = prepare(argv[1]), target = prepare(argv[2]);
 
   const auto result = gpureg::align(context, source, target, options);
-  std::cout << explain(result.reason) << "\nscore " << result.score << "\n";
+  std::cout << explain(result.reason) << "\nconfidence " << result.confidence << "\n";
   if (!result.aligned()) return 1;
   std::cout << "target_from_source\n" << result.target_from_source.matrix() << "\n";
   return 0;

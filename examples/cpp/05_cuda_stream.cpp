@@ -48,7 +48,7 @@ int main(int argc, char** argv) try {
   check(cudaStreamDestroy(stream));
 
   std::cout << context.description() << ": " << explain(result.reason) << "\n"
-            << "score " << result.score << "\n";
+            << "confidence " << result.confidence << "\n";
   if (!result.aligned()) return 1;
   std::cout << "target_from_source\n" << result.target_from_source.matrix() << "\n";
   return 0;

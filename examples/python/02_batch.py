@@ -26,9 +26,11 @@ def main() -> None:
     options = gpureg.RegistrationOptions(voxel_size=arguments.voxel_size, quality=arguments.quality)
     run = gpureg.register_all(arguments.folder, output=arguments.output, options=options)
     print(run)
-    best = run.table().sort_by([("score", "descending")]).slice(0, 5)
+    best = run.table().sort_by([("confidence", "descending")]).slice(0, 5)
     for row in best.to_pylist():
-        print(f"{row['j']:4d} into {row['i']:4d}: {row['status']}, score {row['score']:.3f}")
+        print(
+            f"{row['j']:4d} into {row['i']:4d}: {row['status']}, confidence {row['confidence']:.3f}"
+        )
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ def main() -> int:
     graph = reg.PoseGraph()
     for j in range(len(files)):  # begins with the most confident pose relative to an earlier cloud
         known = [pair for pair in aligned if pair[0] == j]
-        best = max(known, key=lambda pair: aligned[pair].score, default=None)
+        best = max(known, key=lambda pair: aligned[pair].confidence, default=None)
         pose = graph.nodes[best[1]].pose @ aligned[best].target_from_source if best else np.eye(4)
         graph.nodes.append(reg.PoseGraphNode(pose))
     for (j, i), result in aligned.items():

@@ -49,16 +49,16 @@ void write_information(const std::string& path, const std::vector<InformationEnt
 void check_entries(const std::string& path, const std::vector<LogEntry>& entries);
 void check_entries(const std::string& path, const std::vector<InformationEntry>& entries);
 
-/// Reported pose of one pair, ranked by score.
+/// Reported pose of one pair, ranked by confidence.
 struct Report {
   int i = 0, j = 0;
   UnalignedMatrix4d transform = UnalignedMatrix4d::Identity();
-  double score = 1;
+  double confidence = 1;  ///< of another program any number that ranks its poses
   /// false: below the threshold of the method. Counts in curves and in raw recall only.
   bool reported = true;
-  /// Score for the strict ranking, under which a correct pose of a pair with little overlap counts
-  /// as false. Empty: score.
-  std::optional<double> strict_score = std::nullopt;
+  /// Ranks under the strict rule, by which a correct pose of a pair with little overlap counts as
+  /// false. Empty: confidence.
+  std::optional<double> overlap_confidence = std::nullopt;
 };
 
 /// Ground truth of one scene.
@@ -88,7 +88,7 @@ struct Scores {
   double precision() const { return reported ? double(good) / reported : 1; }
 };
 
-/// Recall at fixed precisions and average precision over the ranking by score.
+/// Recall at fixed precisions and average precision over the ranking by confidence.
 struct RankedScores {
   double raw_recall = 0;  ///< recall if the best candidate of every pair is reported
   double recall_at_50 = 0, recall_at_80 = 0, recall_at_95 = 0, recall_at_99 = 0;
@@ -111,11 +111,11 @@ double redwood_error(const Eigen::Matrix4d& ground_truth, const Eigen::Matrix4d&
                      const Eigen::Matrix<double, 6, 6>& information);
 
 /// Evaluates the reports of one scene. Only pairs with j - i > 1 count; duplicates count twice.
-/// Equal scores enter the ranking together. Average precision is the sum of precision times gain in
-/// recall over all thresholds.
+/// Equal confidences enter the ranking together. Average precision is the sum of precision times
+/// gain in recall over all thresholds.
 /// @param ranked also fill the ranked scores.
-/// @throws InvalidArgument for truths without information matrices and, if ranked, for a score
-///   that is NaN.
+/// @throws InvalidArgument for truths without information matrices and, if ranked, for a
+///   confidence that is NaN.
 Evaluation evaluate(const GroundTruth& truth, const std::vector<Report>& reports, bool ranked);
 
 /// Unweighted mean over scenes, as in Redwood's table.

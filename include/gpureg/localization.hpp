@@ -160,6 +160,14 @@ enum class LocateStatus : std::uint8_t {
 };
 const char* to_string(LocateStatus status);  ///< "not_found", ...
 
+/// The search that a result comes from: each one runs if the one before is not sure.
+enum class SearchStage : std::uint8_t {
+  from_above,    ///< scan and map seen from above
+  coarse_tiles,  ///< tiles of the map, in coarse voxels
+  tiles          ///< the best tiles, in the voxels of the map
+};
+const char* to_string(SearchStage stage);  ///< "from_above", ...
+
 /// A pose of a scan in a map.
 struct LocatedPose {
   UnalignedIsometry3d map_from_scan = no_pose();
@@ -180,8 +188,9 @@ struct LocateResult {
   /// Probability that none of the poses is correct: the scan is not in this map, or its place was
   /// not among the candidates.
   double absent_probability = 1;
-  std::size_t scan_points = 0;          ///< prepared points of the scan
-  std::size_t tiles = 0;                ///< that the scan was aligned with; 0: seen from above
+  std::size_t scan_points = 0;  ///< prepared points of the scan
+  SearchStage stage = SearchStage::from_above;
+  std::size_t tiles = 0;                ///< that the scan was aligned with
   std::size_t neighborhood_points = 0;  ///< points of the map around the first pose
 };
 

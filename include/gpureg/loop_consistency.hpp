@@ -46,7 +46,7 @@ struct PairConsistency {
   std::uint32_t mode = 0;
   std::uint32_t loops = 0;  ///< loops of three that the pair is in
   /// Number of pairs on the most confident path that it was compared with; 0: no such path, or the
-  /// pair belongs to these paths. Without loops and path the confidence is the result's own score.
+  /// pair belongs to these paths. Without loops and path the confidence is that of the result.
   std::uint32_t path = 0;
 };
 
@@ -59,11 +59,11 @@ struct PairConsistency {
 /// maximum spanning forest) keep their probability; every other pair is compared with the path that
 /// they form between its clouds. Perceptual aliases agree with each other in loops of three, but
 /// not with the path from one place to the other. Results without modes
-/// (RegistrationMethod::quadruples) take part with their pose and score.
+/// (RegistrationMethod::quadruples) take part with their pose and confidence.
 ///
 /// Closing errors are measured at the centres of the clouds, known from the results' moments (of
 /// results without moments: at the origin). Deterministic and independent of the order of the
-/// pairs. Pairs of a cloud with itself and pairs that were never tried keep their score.
+/// pairs. Pairs of a cloud with itself and pairs that were never tried keep their confidence.
 /// Thread-safe.
 ///
 /// @param pairs indices of clouds, as for align_batch().

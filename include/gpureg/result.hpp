@@ -59,14 +59,13 @@ struct RegistrationMode {
 struct RegistrationResult {
   RegistrationStatus status = RegistrationStatus::skipped;
   RegistrationReason reason = RegistrationReason::cancelled;
-  /// target_from_source holds a pose, reported or not. A pose that is not reported and brings no
-  /// points together is none.
-  bool has_candidate = false;
   /// Moves the source's points into the target's frame: p_target = target_from_source * p_source.
-  /// Converts to Eigen::Isometry3d. NaN without a candidate.
+  /// Converts to Eigen::Isometry3d. The most confident pose, reported or not; NaN if there is none,
+  /// and if it is not reported and brings no points together: has_pose().
   UnalignedIsometry3d target_from_source = no_pose();
-  /// Ranks results: the confidence; with RegistrationMethod::quadruples the inlier ratio.
-  double score = 0;
+  /// Probability that target_from_source is correct; with RegistrationMethod::quadruples the inlier
+  /// ratio. What reaches RegistrationOptions::min_confidence is reported.
+  double confidence = 0;
   double inlier_ratio = 0;  ///< verified inliers / points scored, [0, 1]
   double inlier_rmse = 0;   ///< over the inliers, in the unit of the points
   /// Moments of all correspondences within max_correspondence_distance, whatever their normals:
@@ -82,8 +81,8 @@ struct RegistrationResult {
   /// the source onto that of the target, exactly; the moments are those of points in the planes.
   bool flat = false;
   /// What was known of the places that the clouds were seen from.
-  ViewpointSource source_viewpoint = ViewpointSource::said;
-  ViewpointSource target_viewpoint = ViewpointSource::said;
+  ViewpointSource source_viewpoint = ViewpointSource::given;
+  ViewpointSource target_viewpoint = ViewpointSource::given;
   StageTimings timings;
 
   /// True for aligned_up_to_symmetry, too.
@@ -91,16 +90,18 @@ struct RegistrationResult {
     return status == RegistrationStatus::aligned ||
            status == RegistrationStatus::aligned_up_to_symmetry;
   }
+  /// target_from_source holds a pose, reported or not.
+  bool has_pose() const { return !target_from_source.matrix().array().isNaN().all(); }
   /// Number of modes that the clouds cannot tell from the first one, with that one; 0 without
   /// modes.
   std::size_t equivalent_poses() const;
   /// Probability that the first mode or one of its equivalents is correct: the sum of their
-  /// confidences. The score without modes.
+  /// confidences. The confidence without modes.
   double symmetry_confidence() const;
 };
 
 /// The most telling reason why the first mode is not confident, by its evidence, the other modes
-/// and the numbers of points. Does not read status, reason and score.
+/// and the numbers of points. Does not read status, reason and confidence.
 /// @return confidence_too_low if no single reason stands out.
 RegistrationReason diagnose(const RegistrationResult& result);
 

@@ -7,7 +7,7 @@ namespace gpureg {
 
 enum class RegistrationStatus : std::uint8_t {
   aligned,  ///< target_from_source passed every threshold
-  /// No pose passed. reason says why; target_from_source is the best candidate if has_candidate.
+  /// No pose passed. reason says why; target_from_source is the best candidate, or NaN.
   not_aligned,
   skipped,  ///< never tried, because the batch was cancelled before
   /// target_from_source is one of several poses that a symmetry makes equivalent, and only their
@@ -56,7 +56,7 @@ constexpr RegistrationReason kLastRegistrationReason = RegistrationReason::contr
 /// How the viewpoint of a cloud is known. It decides about free space and about the sides of
 /// surfaces.
 enum class ViewpointSource : std::uint8_t {
-  said,     ///< viewpoints were given
+  given,    ///< viewpoints were given
   origin,   ///< the origin of the cloud's frame; nothing given, and the surfaces agree with it
   normals,  ///< no viewpoint; the input normals tell the sides of surfaces
   /// No viewpoint: neither free space nor the sides of surfaces are known. Alignments try both
@@ -134,7 +134,7 @@ struct PrepareStatistics {
   std::uint32_t points_without_normal = 0;  ///< fewer than 3 neighbours
   /// No neighbour within the feature radius, or no normal: never matched.
   std::uint32_t points_without_feature = 0;
-  ViewpointSource viewpoint = ViewpointSource::said;
+  ViewpointSource viewpoint = ViewpointSource::given;
   /// Prepared points whose input normal contradicted the normals around it and was flipped.
   std::uint32_t repaired_normals = 0;
   /// A scan of a 2-D scanner: its points lie in a plane and form curves. It was prepared in layers

@@ -189,6 +189,12 @@ void bind_localization(py::module_& m) {
                     "Probability that none of the poses is correct: the scan is not in this map, "
                     "or its place was not among the candidates.")
       .def_readonly("scan_points", &R::scan_points, "Prepared points of the scan.")
+      .def_property_readonly(
+          "stage", [](const R& r) { return localization::to_string(r.stage); },
+          "The search that the result comes from; each one runs if the one before is not sure: "
+          "'from_above' (scan and map seen from above), 'coarse_tiles' (tiles of the map, in "
+          "coarse "
+          "voxels), 'tiles' (the best ones, in the voxels of the map).")
       .def_readonly("tiles", &R::tiles, "Tiles that the scan was aligned with.")
       .def_readonly("neighborhood_points", &R::neighborhood_points,
                     "Points of the map around the first pose.")

@@ -101,21 +101,14 @@ void bind_mode(py::module_& m) {
       });
 }
 
-// NaN rather than the identity where there is no pose: nobody shall take it for one.
-py::array_t<double> pose_of(const RegistrationResult& r) {
-  Eigen::Matrix4d pose = Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
-  if (r.has_candidate) pose = r.target_from_source.matrix();
-  return array_of(pose);
-}
-
 std::string text_of(const RegistrationResult& r) {
   char numbers[160];
-  std::snprintf(numbers, sizeof(numbers), "score %.3f, rmse %.4g, %u of %u inliers, %.1f ms",
-                r.score, r.inlier_rmse, r.statistics.inliers, r.statistics.points_scored,
+  std::snprintf(numbers, sizeof(numbers), "confidence %.3f, rmse %.4g, %u of %u inliers, %.1f ms",
+                r.confidence, r.inlier_rmse, r.statistics.inliers, r.statistics.points_scored,
                 r.timings.total());
   std::string text = std::string("<gpureg.RegistrationResult ") + to_string(r.status);
   if (!r.aligned()) text += std::string(": ") + to_string(r.reason);
-  if (r.has_candidate) text += std::string(", ") + numbers;
+  if (r.has_pose()) text += std::string(", ") + numbers;
   return text + ">";
 }
 
@@ -136,9 +129,8 @@ py::dict result_state(const RegistrationResult& r) {
   py::dict state;
   state["status"] = to_string(r.status);
   state["reason"] = to_string(r.reason);
-  state["has_candidate"] = r.has_candidate;
   state["target_from_source"] = array_of(r.target_from_source.matrix());
-  state["score"] = r.score;
+  state["confidence"] = r.confidence;
   state["inlier_ratio"] = r.inlier_ratio;
   state["inlier_rmse"] = r.inlier_rmse;
   state["source_moments"] = state_of(r.source_moments);
@@ -158,10 +150,9 @@ RegistrationResult result_from(const py::dict& state) {
   RegistrationResult r;
   r.status = status_from(state["status"].cast<std::string>());
   r.reason = reason_from(state["reason"].cast<std::string>());
-  r.has_candidate = state["has_candidate"].cast<bool>();
   r.target_from_source.matrix() = matrix_of<Eigen::Matrix4d>(
       state["target_from_source"].cast<py::array_t<double>>(), "target_from_source");
-  r.score = state["score"].cast<double>();
+  r.confidence = state["confidence"].cast<double>();
   r.inlier_ratio = state["inlier_ratio"].cast<double>();
   r.inlier_rmse = state["inlier_rmse"].cast<double>();
   r.source_moments = moments_from(state["source_moments"]);
@@ -200,13 +191,15 @@ void bind_registration_result(py::module_& m) {
       .def_property_readonly(
           "aligned", &R::aligned,
           "A pose is reported: status \"aligned\" or \"aligned_up_to_symmetry\".")
-      .def_readonly("has_candidate", &R::has_candidate,
-                    "target_from_source holds a pose, reported or not.")
-      .def_property_readonly("target_from_source", &pose_of,
-                             "(4, 4) float64: maps points of the source into the target's frame; "
-                             "NaN where there is no candidate.")
-      .def_readonly("score", &R::score,
-                    "Ranks results: the confidence; with the method 'quadruples' the inlier ratio.")
+      .def_property_readonly("has_pose", &R::has_pose,
+                             "target_from_source holds a pose, reported or not.")
+      .def_property_readonly(
+          "target_from_source", [](const R& r) { return array_of(r.target_from_source.matrix()); },
+          "(4, 4) float64: maps points of the source into the target's frame; "
+          "NaN where there is none.")
+      .def_readonly("confidence", &R::confidence,
+                    "Probability that target_from_source is correct; with the method 'quadruples' "
+                    "the inlier ratio. What reaches min_confidence is reported.")
       .def_property_readonly("symmetry_confidence", &R::symmetry_confidence,
                              "Probability that the pose or one of its equivalent modes is correct: "
                              "the sum of their confidences.")

@@ -38,12 +38,12 @@ def loop_consistency(
         ``confidence`` given all pairs; ``mode``, an index into ``RegistrationResult.modes``;
         ``loops``, the number of loops of three that the pair is in; ``path``, the number of pairs on
         the path that it was compared with. Without loops and path the confidence is the result's
-        score.
+        confidence.
 
     Raises
     ------
     ValueError
-        Naming the entry: different lengths, scores outside [0, 1], poses that are no rigid motions.
+        Naming the entry: different lengths, confidences outside [0, 1], poses that are no rigid motions.
 
     Examples
     --------

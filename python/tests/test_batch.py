@@ -46,9 +46,9 @@ def test_table_is_what_align_says(whole):
     assert sum(row["status"] == "aligned" for row in rows) == whole.aligned > 100
     for row in random.Random(1).sample(rows, 25):
         result = gpureg.align(clouds[row["j"]], clouds[row["i"]], options=many.options())
-        assert row["status"] == result.status and row["score"] == result.score
+        assert row["status"] == result.status and row["confidence"] == result.confidence
         assert row["inliers"] == result.statistics.inliers
-        if result.has_candidate:
+        if result.has_pose:
             assert row["target_from_source"] == result.target_from_source.ravel().tolist()
         else:
             assert row["target_from_source"] is None
@@ -443,7 +443,7 @@ class TestCommand:
 
         result = gpureg.register(a, b, voxel_size)
         assert pair["target_from_source"] == result.target_from_source.ravel().tolist()
-        assert pair["score"] == result.score
+        assert pair["confidence"] == result.confidence
         options = gpureg.RegistrationOptions(voxel_size=voxel_size)
         made = gpureg.reconstruct(folder, options=options)
         assert made.islands == scene["islands"] == [[0, 1, 2, 3]]
@@ -478,11 +478,11 @@ class TestCommand:
         for pair in pairs:
             row = rows[pair["i"], pair["j"]]
             assert row["target_from_source"] == pair["T_ij"]
-            for name in ("status", "reason", "score", "inlier_ratio", "inlier_rmse"):
+            for name in ("status", "reason", "confidence", "inlier_ratio", "inlier_rmse"):
                 assert row[name] == pair[name], name
             for name, value in pair["statistics"].items():
                 assert row[name] == value, name
-        assert np.isfinite([row["score"] for row in rows.values()]).all()
+        assert np.isfinite([row["confidence"] for row in rows.values()]).all()
 
 
 @pytest.mark.parametrize(

@@ -50,12 +50,14 @@ def test_every_call_maps_its_confidences(clouds):
     plain, scaled = options(), options(CALIBRATION)
     source, target = gpureg.prepare_batch([a, b], options=plain)
     calls = {
-        "register": lambda o: gpureg.register(a, b, options=o).score,
-        "align": lambda o: gpureg.align(source, target, options=o).score,
+        "register": lambda o: gpureg.register(a, b, options=o).confidence,
+        "align": lambda o: gpureg.align(source, target, options=o).confidence,
         "align_batch": lambda o: gpureg.align_batch([a, b, c], [(0, 1), (1, 2)], options=o)[
             0
-        ].score,
-        "align_within": lambda o: gpureg.align_within(source, target, 1e-3, options=o).result.score,
+        ].confidence,
+        "align_within": lambda o: gpureg.align_within(
+            source, target, 1e-3, options=o
+        ).result.confidence,
     }
     for name, call in calls.items():
         before = call(plain)

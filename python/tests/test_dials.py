@@ -22,7 +22,7 @@ def test_a_time_budget_gives_the_result_of_its_level(clouds):
     assert timed.levels >= 2 and timed.milliseconds > 0
     alone = gpureg.align(a, b, options=options.replace(quality=timed.quality))
     assert np.array_equal(timed.result.target_from_source, alone.target_from_source)
-    assert timed.result.score == alone.score
+    assert timed.result.confidence == alone.confidence
     lowest = gpureg.align_within(a, b, 1e-3, options=options)
     assert (lowest.quality, lowest.levels) == (0, 1)
     with pytest.raises(gpureg.InvalidArgument, match="milliseconds is -1"):

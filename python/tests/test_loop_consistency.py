@@ -30,9 +30,9 @@ def with_state(result, **changes):
 
 def test_correct_pairs_of_a_loop_rise_and_a_false_one_falls(loop):
     pairs, results = loop
-    weak = [with_state(r, score=0.6, modes=[]) for r in results]
+    weak = [with_state(r, confidence=0.6, modes=[]) for r in results]
     for before, after in zip(weak, gpureg.loop_consistency(pairs, weak)):
-        assert after.confidence > before.score and (after.mode, after.loops) == (0, 1)
+        assert after.confidence > before.confidence and (after.mode, after.loops) == (0, 1)
     false = weak[:2] + [with_state(weak[2], target_from_source=np.eye(4))]
     assert gpureg.loop_consistency(np.array(pairs), false)[2].confidence < 0.6
 
@@ -40,7 +40,7 @@ def test_correct_pairs_of_a_loop_rise_and_a_false_one_falls(loop):
 def test_without_loops_scores_stay(loop):
     pairs, results = loop
     consistent = gpureg.loop_consistency(pairs[:2], results[:2])
-    assert [(p.confidence, p.loops) for p in consistent] == [(r.score, 0) for r in results[:2]]
+    assert [(p.confidence, p.loops) for p in consistent] == [(r.confidence, 0) for r in results[:2]]
     assert gpureg.loop_consistency([], []) == []
     assert pickle.loads(pickle.dumps(consistent[0])) == consistent[0]
 
@@ -60,8 +60,10 @@ def test_bad_input_is_named(loop):
     pairs, results = loop
     with pytest.raises(gpureg.InvalidArgument, match="results has 2 entries, but pairs has 3"):
         gpureg.loop_consistency(pairs, results[:2])
-    with pytest.raises(gpureg.InvalidArgument, match=r"results\[1\].score is 2"):
-        gpureg.loop_consistency(pairs, [results[0], with_state(results[1], score=2.0), results[2]])
+    with pytest.raises(gpureg.InvalidArgument, match=r"results\[1\].confidence is 2"):
+        gpureg.loop_consistency(
+            pairs, [results[0], with_state(results[1], confidence=2.0), results[2]]
+        )
     with pytest.raises(TypeError, match=r"results\[0\]: expected a RegistrationResult, got 1"):
         gpureg.loop_consistency(pairs, [1, 2, 3])
     with pytest.raises(TypeError, match="options: expected LoopConsistencyOptions"):

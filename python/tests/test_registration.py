@@ -37,7 +37,7 @@ def test_register_finds_the_pose(source, target, truth):
     assert 0.4 < result.inlier_ratio <= 1 and 0 < result.inlier_rmse < 0.05
     assert result.statistics.hypotheses == 128
     assert result.timings.total > 0
-    assert repr(result).startswith("<gpureg.RegistrationResult aligned, score ")
+    assert repr(result).startswith("<gpureg.RegistrationResult aligned, confidence ")
 
 
 def test_modes_carry_their_evidence(source, target):
@@ -46,7 +46,7 @@ def test_modes_carry_their_evidence(source, target):
     best, alternative = result.modes[:2]
     assert (
         np.array_equal(best.target_from_source, result.target_from_source)
-        and best.confidence == result.score
+        and best.confidence == result.confidence
     )
     assert best.confidence >= alternative.confidence and best.overlap_confidence <= best.confidence
     assert best.evidence.match_support > alternative.evidence.match_support
@@ -61,7 +61,7 @@ def test_modes_carry_their_evidence(source, target):
         gpureg.prepare(target),
         options=gpureg.RegistrationOptions(method="quadruples", quadruples=20000),
     )
-    assert paper.aligned and paper.modes == [] and paper.score == paper.inlier_ratio
+    assert paper.aligned and paper.modes == [] and paper.confidence == paper.inlier_ratio
 
 
 @pytest.mark.parametrize("method", ["loopsmart", "default"])
@@ -95,9 +95,9 @@ def test_seed_and_voxel_size_are_used(source, target):
 def test_no_alignment_is_a_status(source):
     result = gpureg.register(source, np.random.default_rng(0).random((9000, 3)), quality=1)
     assert result.status == "not_aligned" and not result.aligned and not result
-    assert result.reason in ("too_little_overlap", "clutter") and result.score < 0.5
+    assert result.reason in ("too_little_overlap", "clutter") and result.confidence < 0.5
     assert "% of the" in result.explanation and result.advice
-    if not result.has_candidate:
+    if not result.has_pose:
         assert np.isnan(result.target_from_source).all()
 
 

@@ -69,7 +69,7 @@ def test_a_known_scale_is_that_of_register():
     plain = gpureg.register(a, b, 0.1)
     assert known.scale_status == "known" and known.scale == 1
     assert np.array_equal(known.result.target_from_source, plain.target_from_source)
-    assert known.confidence == plain.score
+    assert known.confidence == plain.confidence
 
 
 @pytest.mark.parametrize("scale", [0, -1, float("nan"), float("inf"), (0, 1), (2, 1), (1, np.nan)])

@@ -140,7 +140,7 @@ def test_ctrl_c_ends_a_single_call(slow, call):
 
 def test_nothing_is_left_of_an_interrupted_call(source, target):
     def bits(result):
-        return result.target_from_source.tobytes(), result.score
+        return result.target_from_source.tobytes(), result.confidence
 
     context, options = gpureg.Context.cpu(2), few(20_000)
     a, b = gpureg.prepare_batch([source, target], context=context)

@@ -15,7 +15,7 @@ def test_modes_of_align_keep_their_evidence():
     result = gpureg.align(a, b)
     assert result.aligned
     found = gpureg.verify(a, b, [mode.target_from_source for mode in result.modes])
-    assert found[0].confidence == result.score
+    assert found[0].confidence == result.confidence
     assert found[0].inlier_ratio == result.inlier_ratio
     for verified, mode in zip(found, result.modes):
         assert verified.evidence.source_overlap == mode.evidence.source_overlap

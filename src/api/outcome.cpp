@@ -30,7 +30,7 @@ RegistrationReason evidence_reason(const RegistrationResult& result, bool contra
                ? RegistrationReason::too_few_points
                : RegistrationReason::degenerate_geometry;
   if (contradicted) return RegistrationReason::contradicts_prior;
-  if (result.score >= options.min_confidence) return RegistrationReason::none;
+  if (result.confidence >= options.min_confidence) return RegistrationReason::none;
   if (result.symmetry_confidence() < options.min_confidence) return diagnose(result);
   return options.accept_symmetry ? RegistrationReason::none : RegistrationReason::symmetric;
 }
@@ -38,13 +38,12 @@ RegistrationReason evidence_reason(const RegistrationResult& result, bool contra
 RegistrationStatus status_of(const RegistrationResult& result,
                              const RegistrationSettings& options) {
   if (result.reason != RegistrationReason::none) return RegistrationStatus::not_aligned;
-  return result.score >= options.min_confidence ? RegistrationStatus::aligned
-                                                : RegistrationStatus::aligned_up_to_symmetry;
+  return result.confidence >= options.min_confidence ? RegistrationStatus::aligned
+                                                     : RegistrationStatus::aligned_up_to_symmetry;
 }
 
 /// A pose under which nothing overlaps is no candidate. Its confidence is 0.
 void drop_candidate(RegistrationResult& result) {
-  result.has_candidate = false;
   result.target_from_source = no_pose();
   result.modes.clear();
 }
@@ -172,9 +171,8 @@ class Modes {
 void add_modes(const PairOutcome& outcome, const AlignedPair& pair, RegistrationResult& result) {
   result.modes = Modes(outcome, pair).ranked();
   const ModeOutcome& best = outcome.modes[result.modes.front().rank_before_refinement];
-  result.has_candidate = true;
   result.target_from_source = result.modes.front().target_from_source;
-  result.score = result.modes.front().confidence;
+  result.confidence = result.modes.front().confidence;
   result.statistics.points_scored = best.source.points(Term::tested);
   result.statistics.inliers = result.statistics.consensus = best.source.points(Term::inliers);
   result.statistics.refine_iterations = best.iterations;
@@ -209,7 +207,6 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
   result.reason = outcome.reason;
   result.status = outcome.reason == RegistrationReason::none ? RegistrationStatus::aligned
                                                              : RegistrationStatus::not_aligned;
-  result.has_candidate = outcome.has_pose;
   result.statistics = outcome.statistics;
   result.timings = outcome.timings;
   result.source_viewpoint = pair.source.statistics.viewpoint;
@@ -228,7 +225,6 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
         pair.target.size > 0) {
       result.reason = RegistrationReason::flat_with_solid;
       result.status = RegistrationStatus::not_aligned;
-      result.has_candidate = false;
       return result;
     }
     if (!outcome.modes.empty()) add_modes(outcome, pair, result);
@@ -245,7 +241,7 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
 
   result.target_from_source = pair.transform_of(outcome.pose);
   result.inlier_ratio = pipeline::inlier_ratio(outcome.statistics);
-  result.score = result.inlier_ratio;
+  result.confidence = result.inlier_ratio;
   result.inlier_rmse = pair.rmse(outcome.support.residual, outcome.support.inliers);
   result.source_moments = pair.source_moments(outcome);
   result.target_moments = pair.target_moments(outcome);

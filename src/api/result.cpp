@@ -70,8 +70,8 @@ const char* to_string(RegistrationReason reason) {
 
 const char* to_string(ViewpointSource source) {
   switch (source) {
-    case ViewpointSource::said:
-      return "said";
+    case ViewpointSource::given:
+      return "given";
     case ViewpointSource::origin:
       return "origin";
     case ViewpointSource::normals:
@@ -86,7 +86,7 @@ const char* to_string(ViewpointSource source) {
 
 const char* explain(ViewpointSource source) {
   switch (source) {
-    case ViewpointSource::said:
+    case ViewpointSource::given:
       return "given";
     case ViewpointSource::origin:
       return "the origin, which the surfaces agree with";
@@ -156,7 +156,7 @@ std::size_t RegistrationResult::equivalent_poses() const {
 }
 
 double RegistrationResult::symmetry_confidence() const {
-  if (modes.empty()) return score;
+  if (modes.empty()) return confidence;
   double sum = modes.front().confidence;
   for (const RegistrationMode& mode : modes)
     if (mode.equivalent) sum += mode.confidence;

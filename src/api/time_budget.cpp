@@ -19,7 +19,7 @@ constexpr double kMinGrowth = 0.2, kMaxGrowth = 1.25;
 
 bool same_pose(const RegistrationResult& a, const RegistrationResult& b,
                const EvidenceSettings& options) {
-  return a.has_candidate && b.has_candidate &&
+  return a.has_pose() && b.has_pose() &&
          same_mode_at(a.target_from_source, b.target_from_source,
                       middle_of(a.source_moments, Eigen::Vector3d::Zero()), options);
 }
@@ -59,9 +59,9 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     const double started = runner.now();
     RegistrationResult result = runner.align(quality);
     const double ended = runner.now();
-    const bool agree = best.levels > 0 && result.score >= kConfident && last.score >= kConfident &&
-                       same_pose(result, last, options.evidence);
-    if (best.levels == 0 || result.score >= best.result.score) {
+    const bool agree = best.levels > 0 && result.confidence >= kConfident &&
+                       last.confidence >= kConfident && same_pose(result, last, options.evidence);
+    if (best.levels == 0 || result.confidence >= best.result.confidence) {
       best.result = result;
       best.quality = quality;
     }
@@ -80,7 +80,7 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     if (prediction(next) > left) return best;
     // A confident result needs only a confirmation by the next level; otherwise the time goes into
     // the highest level that it allows.
-    while (last.score < kConfident && next < kHighestQuality && prediction(next + 1) <= left)
+    while (last.confidence < kConfident && next < kHighestQuality && prediction(next + 1) <= left)
       ++next;
     predicted = prediction(next);
     quality = next;

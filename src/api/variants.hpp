@@ -41,10 +41,10 @@ inline void keep_better(RegistrationResult&& candidate, RegistrationResult& kept
   StageTimings sum = candidate.timings;
   sum += kept.timings;
   const auto better = [&] {
-    if (candidate.has_candidate != kept.has_candidate) return candidate.has_candidate;
+    if (candidate.has_pose() != kept.has_pose()) return candidate.has_pose();
     const double together = candidate.symmetry_confidence(), before = kept.symmetry_confidence();
     if (together != before) return together > before;
-    return candidate.score > kept.score;
+    return candidate.confidence > kept.confidence;
   };
   if (first || better()) kept = std::move(candidate);
   kept.timings = sum;

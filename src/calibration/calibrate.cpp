@@ -154,7 +154,7 @@ class Calibration {
           align_batch(context_, prepared, pairs, options_);
       for (std::size_t k = 0; k < results.size(); ++k) {
         ++out_.one_scan.pairs;
-        if (!results[k].has_candidate) continue;
+        if (!results[k].has_pose()) continue;
         const std::uint32_t cloud = usable_[(begin + k) % usable_.size()];
         add(CalibrationKind::one_scan, {cloud, cloud}, results[k],
             is_correct(results[k], halves[k].target_from_source, prepared[pairs[k].source].points(),
@@ -185,7 +185,7 @@ class Calibration {
                                 &target = poses_[pairs_[p].target];
       if (!source.matrix().allFinite() || !target.matrix().allFinite()) continue;
       ++out_.trajectory.pairs;
-      if (!results_[p].has_candidate) continue;
+      if (!results_[p].has_pose()) continue;
       const PreparedCloud& cloud = prepared_[pairs_[p].source];
       std::vector<Eigen::Vector3f> points = cloud.points();
       for (Eigen::Vector3f& point : points)

@@ -51,10 +51,11 @@ std::vector<std::optional<bool>> verdicts_of_loops(const std::vector<Pair>& pair
   std::vector<std::optional<bool>> out(pairs.size());
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const PairConsistency& pair = consistency[p];
-    if (!results[p].has_candidate || (pair.loops == 0 && pair.path == 0)) continue;
+    if (!results[p].has_pose() || (pair.loops == 0 && pair.path == 0)) continue;
     // The verdict must come from the other pairs alone, as the confidence of this one is what is
     // calibrated: loops decide from even odds.
-    const double own = pair.mode == 0 ? results[p].score : results[p].modes[pair.mode].confidence;
+    const double own =
+        pair.mode == 0 ? results[p].confidence : results[p].modes[pair.mode].confidence;
     const double factor = odds_of(pair.confidence) / odds_of(std::max(own, 1e-12));
     const bool is_first = pair.mode == 0 || results[p].modes[pair.mode].equivalent;
     if (factor >= odds_of(kSure)) out[p] = is_first;

@@ -10,7 +10,7 @@ namespace gpureg::evaluation {
 RankedScores rank(std::vector<Verdict> verdicts, int ground_truth) {
   for (const Verdict& v : verdicts)
     if (std::isnan(v.score))
-      throw InvalidArgument("report.score is nan, expected a number to rank by");
+      throw InvalidArgument("report.confidence is nan, expected a number to rank by");
   RankedScores scores;
   if (ground_truth == 0) return scores;
   std::sort(verdicts.begin(), verdicts.end(),

@@ -88,9 +88,9 @@ Evaluation evaluate(const GroundTruth& truth, const std::vector<Report>& reports
     if (!counts(report.i, report.j)) continue;
     const bool is_wanted = wanted.count({report.i, report.j}) != 0;
     const bool strictly = is_good(wanted, report), anyhow = is_good(right, report);
-    strict.push_back(
-        {report.strict_score.value_or(report.score), report.reported, strictly, strictly});
-    geometric.push_back({report.score, report.reported, anyhow, anyhow && is_wanted});
+    strict.push_back({report.overlap_confidence.value_or(report.confidence), report.reported,
+                      strictly, strictly});
+    geometric.push_back({report.confidence, report.reported, anyhow, anyhow && is_wanted});
   }
 
   Evaluation result;

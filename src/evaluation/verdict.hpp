@@ -13,7 +13,7 @@ inline bool counts(int i, int j) { return static_cast<long long>(j) - i > 1; }
 
 /// One report under one rule.
 struct Verdict {
-  double score = 1;
+  double score = 1;  ///< ranks, by the rule
   bool reported = true;
   bool good = false;         ///< right under the rule
   bool good_recall = false;  ///< right, and one of gt.log's pairs

@@ -44,7 +44,7 @@ struct Fields<PairConsistency> {
     v(&P::confidence, {"confidence", "Probability that the mode is correct, given all pairs."});
     v(&P::mode, {"mode", "Index into RegistrationResult.modes; 0, target_from_source, if there are none."});
     v(&P::loops, {"loops", "Loops of three that the pair is in."});
-    v(&P::path, {"path", "Number of pairs on the most confident path that the pair was compared with; 0: none. Without loops and path the confidence is the result's score."});
+    v(&P::path, {"path", "Number of pairs on the most confident path that the pair was compared with; 0: none. Without loops and path the confidence is that of the result."});
   }
   // clang-format on
 };

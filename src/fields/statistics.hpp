@@ -8,7 +8,7 @@ namespace gpureg::fields {
 
 template <>
 struct Values<ViewpointSource> {
-  static constexpr ViewpointSource kAll[] = {ViewpointSource::said, ViewpointSource::origin,
+  static constexpr ViewpointSource kAll[] = {ViewpointSource::given, ViewpointSource::origin,
                                              ViewpointSource::normals, ViewpointSource::none,
                                              ViewpointSource::model};
 };

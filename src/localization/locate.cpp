@@ -179,14 +179,17 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
     verified.push_back(verify_places(context, state, options, scan));
     LocateResult& result = out[open[k]];
     result = result_of(verified[k], scan, options);
+    result.stage = coarse_first ? SearchStage::coarse_tiles : SearchStage::tiles;
     if (coarse_first && !hopeless && !is_sure(result, options) && best < kSureSearch)
       unsure.push_back(k);
   }
   if (unsure.empty()) return out;
   search_best_tiles(context, state, options, unsure, searched);
-  for (const std::size_t k : unsure)
+  for (const std::size_t k : unsure) {
     out[open[k]] = result_of(verify_places(context, state, options, searched[k], verified[k]),
                              searched[k], options);
+    out[open[k]].stage = SearchStage::tiles;
+  }
   return out;
 }
 

@@ -70,4 +70,16 @@ const char* to_string(LocateStatus status) {
   return "unknown";
 }
 
+const char* to_string(SearchStage stage) {
+  switch (stage) {
+    case SearchStage::from_above:
+      return "from_above";
+    case SearchStage::coarse_tiles:
+      return "coarse_tiles";
+    case SearchStage::tiles:
+      return "tiles";
+  }
+  return "unknown";
+}
+
 }  // namespace gpureg::localization

@@ -36,7 +36,7 @@ PointCloud seen_surface(const Context& context, const PointCloudView& scan,
   out.origin = prepared.origin();
   const ViewpointSource source = prepared.statistics().viewpoint;
   if (source != ViewpointSource::none) out.normals = prepared.normals();
-  if (source == ViewpointSource::said || source == ViewpointSource::origin)
+  if (source == ViewpointSource::given || source == ViewpointSource::origin)
     out.viewpoints = prepared.viewpoints();
   return out;
 }

@@ -158,9 +158,9 @@ void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
 }
 
 void check_result(const RegistrationResult& result) {
-  if (!result.has_candidate) return;
+  if (!result.has_pose()) return;
   check_pose(result.target_from_source, "result.target_from_source");
-  pose_graph::require_confidence(result.score, "result.score");
+  pose_graph::require_confidence(result.confidence, "result.confidence");
   for (std::size_t k = 0; k < result.modes.size(); ++k) {
     const std::string name = "result.modes[" + std::to_string(k) + "]";
     check_pose(result.modes[k].target_from_source, name + ".target_from_source");

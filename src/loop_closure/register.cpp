@@ -19,7 +19,7 @@ std::vector<RegistrationMode> modes_of(const RegistrationResult& result) {
   if (!result.modes.empty()) return result.modes;
   RegistrationMode only;
   only.target_from_source = result.target_from_source;
-  only.confidence = result.score;
+  only.confidence = result.confidence;
   return {only};
 }
 
@@ -67,9 +67,9 @@ LoopRecord record_of(FragmentId source, FragmentId target, const RegistrationRes
   record.target = record.loop.target = target;
   record.loop.state = LoopState::rejected;
   record.loop.reason = LoopReason::not_aligned;
-  if (!result.has_candidate) return record;
+  if (!result.has_pose()) return record;
   record.loop.target_from_source = result.target_from_source;
-  record.loop.confidence = result.score;
+  record.loop.confidence = result.confidence;
   std::vector<RegistrationMode> modes = modes_of(result);
   if (modes.front().confidence < options.acceptance.min_confidence) return record;
   for (const RegistrationMode& mode : modes) {

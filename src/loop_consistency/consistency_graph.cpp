@@ -22,11 +22,11 @@ std::vector<ConsistencyCandidate> candidates_of(const RegistrationResult& result
     out.push_back({turned ? target_from_source.inverse() : target_from_source, prior,
                    static_cast<std::uint32_t>(mode)});
   };
-  if (result.modes.empty()) add(result.target_from_source, result.score, 0);
+  if (result.modes.empty()) add(result.target_from_source, result.confidence, 0);
   for (std::size_t m = 0; m < result.modes.size() && m < options.modes; ++m)
     if (m == 0 || result.modes[m].confidence >= options.min_alternative_confidence)
-      add(result.modes[m].target_from_source, m == 0 ? result.score : result.modes[m].confidence,
-          m);
+      add(result.modes[m].target_from_source,
+          m == 0 ? result.confidence : result.modes[m].confidence, m);
   // At most one pose is correct: the alternatives share half of the remaining probability.
   double alternatives = 0;
   for (std::size_t m = 1; m < out.size(); ++m) alternatives += out[m].prior;
@@ -44,7 +44,7 @@ std::vector<std::size_t> sorted(const std::vector<Pair>& pairs,
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     if (pairs[a].source != pairs[b].source) return pairs[a].source < pairs[b].source;
     if (pairs[a].target != pairs[b].target) return pairs[a].target < pairs[b].target;
-    return results[a].score > results[b].score;
+    return results[a].confidence > results[b].confidence;
   });
   return order;
 }
@@ -107,7 +107,8 @@ void ConsistencyGraph::find_edges(const std::vector<Pair>& pairs,
                                   const std::vector<RegistrationResult>& results) {
   for (const std::size_t p : sorted(pairs, results)) {
     const std::uint32_t source = number(pairs[p].source), target = number(pairs[p].target);
-    if (!results[p].has_candidate || source == target || results[p].score < options_.min_confidence)
+    if (!results[p].has_pose() || source == target ||
+        results[p].confidence < options_.min_confidence)
       continue;
     ConsistencyEdge edge{std::min(source, target),
                          std::max(source, target),

@@ -32,8 +32,8 @@ void check(const std::vector<Pair>& pairs, const std::vector<RegistrationResult>
     const auto name = [p](const char* field) {
       return [p, field] { return "results[" + std::to_string(p) + "]." + field; };
     };
-    check_probability(results[p].score, name("score"));
-    if (results[p].has_candidate)
+    check_probability(results[p].confidence, name("confidence"));
+    if (results[p].has_pose())
       check_rigid(results[p].target_from_source, name("target_from_source"));
     for (std::size_t m = 0; m < results[p].modes.size(); ++m) {
       const auto of_mode = [&](const char* field) {
@@ -60,7 +60,7 @@ std::vector<PairConsistency> loop_consistency(const std::vector<Pair>& pairs,
   update_from_paths(graph);
 
   std::vector<PairConsistency> out(pairs.size());
-  for (std::size_t p = 0; p < out.size(); ++p) out[p].confidence = results[p].score;
+  for (std::size_t p = 0; p < out.size(); ++p) out[p].confidence = results[p].confidence;
   for (const ConsistencyEdge& edge : graph.edges()) {
     if (edge.loops == 0 && edge.path == 0) continue;
     const std::size_t best = edge.most_likely();

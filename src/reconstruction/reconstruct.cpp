@@ -51,7 +51,7 @@ std::vector<RegistrationMode> modes_of(const RegistrationResult& result) {
   if (!result.modes.empty()) return result.modes;
   RegistrationMode only;
   only.target_from_source = result.target_from_source;
-  only.confidence = result.score;
+  only.confidence = result.confidence;
   return {only};
 }
 
@@ -93,8 +93,7 @@ PairGraph graph_of_pairs(std::size_t scans, const std::vector<Pair>& pairs,
   PairGraph out;
   for (std::size_t k = 0; k < scans; ++k) out.graph.nodes.push_back({static_cast<std::int64_t>(k)});
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    if (!results[k].has_candidate || consistency[k].confidence < options.min_edge_confidence)
-      continue;
+    if (!results[k].has_pose() || consistency[k].confidence < options.min_edge_confidence) continue;
     const std::vector<RegistrationMode> modes = modes_of(results[k]);
     const std::vector<Candidate> candidates = candidates_of(modes, consistency[k], options);
     const Eigen::Vector3d centre = overlap_centre(results[k]);

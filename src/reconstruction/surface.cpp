@@ -33,7 +33,7 @@ void keep_scan(const ScanPlane& plane, double voxel_size, Surface& surface) {
 Surface rows_of(const PreparedCloud& cloud) {
   Surface surface{cloud.points(), cloud.normals()};
   // prepare() takes the origin for the viewpoint where none is given.
-  if (cloud.statistics().viewpoint == ViewpointSource::said)
+  if (cloud.statistics().viewpoint == ViewpointSource::given)
     surface.viewpoints = cloud.viewpoints();
   return surface;
 }

@@ -70,7 +70,7 @@ std::vector<Trial> tried(const Context& context, const PreparedLadder& source,
     Trial& trial = out[k];
     trial.scale = scales[k];
     trial.result = std::move(results[k]);
-    if (!trial.result.has_candidate) return;
+    if (!trial.result.has_pose()) return;
     const PreparedState &s = *Access::state(prepared[k]), &t = *Access::state(target.cloud);
     const Pose<double> local = to_local(trial.result.target_from_source, s, t, false);
     UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
@@ -145,7 +145,7 @@ void share_odds(const std::vector<Trial>& trials, ScaledResult& out) {
     mode.confidence *= after / before;
     mode.overlap_confidence *= after / before;
   }
-  out.result.score *= after / before;
+  out.result.confidence *= after / before;
 }
 
 void refuse(ScaledResult& out, RegistrationReason reason) {
@@ -231,7 +231,7 @@ ScaledResult search_scale(const Context& context, const PreparedLadder& source,
   const Trial& best = trials.front();
   out.scale = best.scale;
   out.result = best.result;
-  out.scale_status = out.result.has_candidate ? ScaleStatus::found : ScaleStatus::none;
+  out.scale_status = out.result.has_pose() ? ScaleStatus::found : ScaleStatus::none;
   for (const Trial& trial : trials) out.candidates.push_back({trial.scale, trial.confidence()});
   out.information = best.refined.information;
   if (const double left = best.refined.points > 0 ? best.refined.scale_information : 0; left > 0)

@@ -17,7 +17,7 @@ constexpr double kLeastObserved = 0.1;
 bool has_sensor(const PreparedState& cloud) {
   const ViewpointSource source = cloud.statistics.viewpoint;
   return cloud.viewpoints.size() == 1 &&
-         (source == ViewpointSource::said || source == ViewpointSource::origin);
+         (source == ViewpointSource::given || source == ViewpointSource::origin);
 }
 
 }  // namespace

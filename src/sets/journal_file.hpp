@@ -10,7 +10,7 @@
 namespace gpureg::sets {
 
 inline constexpr std::string_view kJournalMagic = "gpuregPJ";
-inline constexpr std::uint32_t kJournalVersion = 1;
+inline constexpr std::uint32_t kJournalVersion = 2;
 
 enum RecordKind : std::uint32_t {
   kSettings = 1,  ///< name=value, a line each

@@ -100,9 +100,8 @@ template <typename Archive, typename Result>
 void visit(Archive& archive, Result& r) {
   enumerator(archive, r.status);
   enumerator(archive, r.reason);
-  archive.number(r.has_candidate);
   matrix(archive, r.target_from_source.matrix());
-  archive.number(r.score);
+  archive.number(r.confidence);
   archive.number(r.inlier_ratio);
   archive.number(r.inlier_rmse);
   moments(archive, r.source_moments);
@@ -141,7 +140,7 @@ RegistrationResult result_of(std::string_view bytes, const std::string& path) {
   RegistrationResult result;
   visit(reader, result);
   if (reader.in.left() > 0) reader.in.fail();
-  if (result.has_candidate) check_pose(result.target_from_source, path);
+  if (result.has_pose()) check_pose(result.target_from_source, path);
   for (const RegistrationMode& mode : result.modes) check_pose(mode.target_from_source, path);
   return result;
 }

@@ -342,7 +342,7 @@ void UnknownViewpoints::set_statistics(std::size_t cloud, PrepareStatistics& sta
   const CloudKnowledge& known = knowledge_[cloud];
   const Decision& decision = decisions_[cloud];
   statistics.viewpoint = decision.made      ? decision.sides.source
-                         : known.viewpoints ? ViewpointSource::said
+                         : known.viewpoints ? ViewpointSource::given
                          : known.model      ? ViewpointSource::model
                          : known.normals    ? ViewpointSource::normals
                                             : ViewpointSource::origin;

@@ -36,8 +36,8 @@ TEST(Align, FindsRandomPoses) {
     EXPECT_LT(test::translation_error(pose, r.target_from_source), 0.03);
     EXPECT_LT(test::rotation_error_degrees(pose, r.target_from_source), 0.5);
     EXPECT_GT(r.inlier_ratio, 0.8);
-    EXPECT_GT(r.score, 0.9);
-    EXPECT_EQ(r.score, r.modes.front().confidence);
+    EXPECT_GT(r.confidence, 0.9);
+    EXPECT_EQ(r.confidence, r.modes.front().confidence);
     EXPECT_GT(r.inlier_rmse, 0);
     EXPECT_LT(r.inlier_rmse, 0.12);
     const RegistrationStatistics& s = r.statistics;

@@ -33,9 +33,9 @@ std::vector<Eigen::Vector3f> room() {
 void expect_failure(const RegistrationResult& r, RegistrationReason reason) {
   EXPECT_EQ(r.status, RegistrationStatus::not_aligned);
   EXPECT_EQ(r.reason, reason) << to_string(r.reason);
-  EXPECT_FALSE(r.has_candidate);
+  EXPECT_FALSE(r.has_pose());
   EXPECT_TRUE(r.target_from_source.matrix().array().isNaN().all());
-  EXPECT_EQ(r.score, 0);
+  EXPECT_EQ(r.confidence, 0);
 }
 
 TEST(BadInput, FewPoints) {
@@ -47,7 +47,7 @@ TEST(BadInput, FewPoints) {
     expect_failure(run(room(), few), RegistrationReason::too_few_target_points);
     const RegistrationResult both = run(few, few);
     EXPECT_EQ(both.status, RegistrationStatus::not_aligned);
-    EXPECT_FALSE(both.has_candidate);
+    EXPECT_FALSE(both.has_pose());
   }
 }
 
@@ -154,7 +154,7 @@ TEST(BadInput, LyingViews) {
   high.viewpoints = satellite;
   lost.viewpoints = far;
   high.viewpoint_count = lost.viewpoint_count = 1;
-  EXPECT_EQ(prepare(context, high).statistics().viewpoint, ViewpointSource::said);
+  EXPECT_EQ(prepare(context, high).statistics().viewpoint, ViewpointSource::given);
   test::expect_error<InvalidArgument>([&] { prepare_batch(context, {high, lost}); },
                                       {"clouds[1]: cloud.viewpoints is -1e+30"});
   PointCloudView on_a_map(points);  // nobody said that the origin of the map is a viewpoint
@@ -249,7 +249,7 @@ TEST(BadInput, SoFewPointsThatAnyPoseWouldDo) {
           resolve(RegistrationOptions{std::pow(1.0f / static_cast<float>(n), 1.0f / 3)});
       const RegistrationResult r =
           align(Context::cpu(1), PointCloudView(a), PointCloudView(b), options);
-      EXPECT_FALSE(r.aligned()) << n << " points, " << r.score;
+      EXPECT_FALSE(r.aligned()) << n << " points, " << r.confidence;
     }
 }
 

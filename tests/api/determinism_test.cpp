@@ -74,7 +74,6 @@ TEST(ResultBytes, EveryFieldButTheTimings) {
   };
   using Result = RegistrationResult;
   EXPECT_FALSE(differs([](Result& r) { r.timings.match = 1; }));
-  EXPECT_TRUE(differs([](Result& r) { r.has_candidate = true; }));
   EXPECT_TRUE(differs([](Result& r) { r.inlier_ratio = 1; }));
   EXPECT_TRUE(differs([](Result& r) { r.source_viewpoint = ViewpointSource::none; }));
   EXPECT_TRUE(differs([](Result& r) { r.target_viewpoint = ViewpointSource::none; }));

@@ -103,8 +103,8 @@ TEST(EquivalentPoses, HalfATurnIsFoundAndCounted) {
     EXPECT_FALSE(result.modes.front().equivalent);
     // Equivalent poses have odds within a factor of ten. Their sum is at most 1, so the first one
     // has at most 0.76: the root of ten to one.
-    EXPECT_LE(result.score, 0.75);
-    EXPECT_GT(result.symmetry_confidence(), result.score + 0.1);
+    EXPECT_LE(result.confidence, 0.75);
+    EXPECT_GT(result.symmetry_confidence(), result.confidence + 0.1);
     EXPECT_LE(result.symmetry_confidence(), 1);
     // One of the two is the truth, the other half a turn away.
     std::vector<double> errors;
@@ -122,7 +122,7 @@ TEST(EquivalentPoses, APartWithoutSymmetryHasNone) {
   const RegistrationResult result =
       registered(false, random_pose(random), RegistrationOptions{0.02f});
   EXPECT_EQ(result.equivalent_poses(), 1u);
-  EXPECT_EQ(result.symmetry_confidence(), result.score);
+  EXPECT_EQ(result.symmetry_confidence(), result.confidence);
   EXPECT_NE(result.reason, RegistrationReason::symmetric);
 }
 
@@ -143,7 +143,7 @@ TEST(EquivalentPoses, UsersSayWhetherTheyAcceptThem) {
   EXPECT_EQ(accepted.status, RegistrationStatus::aligned_up_to_symmetry);
   EXPECT_EQ(accepted.reason, RegistrationReason::none);
   EXPECT_TRUE(accepted.aligned());
-  EXPECT_EQ(accepted.score, refused.score);
+  EXPECT_EQ(accepted.confidence, refused.confidence);
   options.min_confidence = 0.5 * (1 + together);
   EXPECT_EQ(registered(true, truth, options).reason, RegistrationReason::ambiguous);
 }

@@ -146,7 +146,7 @@ TEST(FlatScans, OtherCloudsAreNone) {
 
 TEST(FlatScans, AreRegisteredInTheirPlane) {
   const RegistrationResult result = registered(first_scan(), second_scan());
-  ASSERT_EQ(result.status, RegistrationStatus::aligned) << result.score;
+  ASSERT_EQ(result.status, RegistrationStatus::aligned) << result.confidence;
   EXPECT_TRUE(result.flat);
   const Eigen::Isometry3d truth = kSecond.inverse() * kFirst;
   const Eigen::Matrix4d pose = result.target_from_source.matrix();
@@ -202,7 +202,7 @@ TEST(FlatScans, TheEvidenceIsThatOfThePlanarPose) {
 
 TEST(FlatScans, TheSmallerCloudMayBeTheTarget) {
   const RegistrationResult result = registered(second_scan(), first_scan());
-  ASSERT_TRUE(result.aligned()) << result.score;
+  ASSERT_TRUE(result.aligned()) << result.confidence;
   ASSERT_TRUE(result.statistics.swapped);
   for (const RegistrationMode& mode : result.modes) {
     EXPECT_EQ(mode.target_from_source(2, 3), 0);
@@ -214,7 +214,7 @@ TEST(FlatScans, PlanesMayDiffer) {
   const Eigen::Isometry3d of_source = tilted(0.3, -0.2, 1.5), of_target = tilted(-0.1, 0.4, -2);
   const RegistrationResult result =
       registered(moved(first_scan(), of_source), moved(second_scan(), of_target));
-  ASSERT_TRUE(result.aligned()) << result.score;
+  ASSERT_TRUE(result.aligned()) << result.confidence;
   const Eigen::Isometry3d truth = of_target * kSecond.inverse() * kFirst * of_source.inverse();
   EXPECT_LT((result.target_from_source.matrix() - truth.matrix()).cwiseAbs().maxCoeff(), 0.03);
   const Eigen::Vector3d normal = result.target_from_source.linear() * of_source.linear().col(2);
@@ -225,7 +225,7 @@ TEST(FlatScans, PlanesMayDiffer) {
 TEST(FlatScans, SameBitsForAnyThreads) {
   const RegistrationResult one = registered(first_scan(), second_scan(), 1),
                            many = registered(first_scan(), second_scan(), 4);
-  EXPECT_EQ(one.score, many.score);
+  EXPECT_EQ(one.confidence, many.confidence);
   EXPECT_EQ(one.target_from_source.matrix(), many.target_from_source.matrix());
 }
 
@@ -236,7 +236,7 @@ TEST(FlatScans, NormalsAcrossThePlaneAreIgnored) {
   with.normals = up.front().data();
   const RegistrationResult result =
       align(Context::cpu(2), with, PointCloudView(target), RegistrationOptions{0.05f});
-  EXPECT_TRUE(result.aligned()) << result.score;
+  EXPECT_TRUE(result.aligned()) << result.confidence;
 }
 
 TEST(FlatScans, CountsAreOfTheScan) {
@@ -260,9 +260,9 @@ TEST(FlatScans, OfAnotherPlaceAreUnlikelyWithoutAThreshold) {
   const RegistrationResult result =
       align(Context::cpu(2), PointCloudView(first_scan()), PointCloudView(circle), options);
   EXPECT_TRUE(result.flat);
-  EXPECT_LT(result.score, 0.2);
-  EXPECT_EQ(result.aligned(), result.has_candidate);
-  if (result.has_candidate) {
+  EXPECT_LT(result.confidence, 0.2);
+  EXPECT_EQ(result.aligned(), result.has_pose());
+  if (result.has_pose()) {
     EXPECT_GT(result.statistics.inliers, 0u);
     EXPECT_EQ(result.target_from_source(2, 3), 0);
   }
@@ -273,7 +273,7 @@ TEST(FlatScans, WithA3dCloudIsRefused) {
   const RegistrationResult result = registered(first_scan(), test::scan_room(random));
   EXPECT_EQ(result.status, RegistrationStatus::not_aligned);
   EXPECT_EQ(result.reason, RegistrationReason::flat_with_solid);
-  EXPECT_FALSE(result.has_candidate);
+  EXPECT_FALSE(result.has_pose());
 }
 
 }  // namespace

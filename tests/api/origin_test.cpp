@@ -62,7 +62,7 @@ TEST(Origin, MovesPosesAndMomentsAndNothingElse) {
                                        view_of(pair.target, pair.target_eye, kUtmTarget));
   ASSERT_TRUE(plain.aligned());
   ASSERT_TRUE(far.aligned());
-  EXPECT_EQ(far.score, plain.score);
+  EXPECT_EQ(far.confidence, plain.confidence);
   ASSERT_EQ(far.modes.size(), plain.modes.size());
   for (std::size_t k = 0; k < far.modes.size(); ++k) {
     const Eigen::Isometry3d expected = translation(kUtmTarget) *

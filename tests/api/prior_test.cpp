@@ -84,12 +84,12 @@ TEST(Prior, ACubeRoomIsTurnedAsItIsKnownToBe) {
     const Scene scene = cube_scene(swapped);
     const RegistrationResult free = scene.align({});
     ASSERT_EQ(free.statistics.swapped, swapped);
-    EXPECT_LT(free.score, 0.4);
+    EXPECT_LT(free.confidence, 0.4);
     const RegistrationResult r = scene.align(scene.about_truth(40, 0.5));
-    ASSERT_TRUE(r.has_candidate) << to_string(r.reason);
+    ASSERT_TRUE(r.has_pose()) << to_string(r.reason);
     EXPECT_LT(test::rotation_error_degrees(scene.truth, r.target_from_source), 1);
     EXPECT_LT(test::translation_error(scene.truth, r.target_from_source), 0.05);
-    EXPECT_GT(r.score, free.score);
+    EXPECT_GT(r.confidence, free.confidence);
     for (const RegistrationMode& mode : r.modes)
       EXPECT_LT(
           test::rotation_error_degrees(scene.truth, Eigen::Isometry3d(mode.target_from_source)),
@@ -128,9 +128,9 @@ TEST(Prior, ContradictionsAreAReason) {
     const RegistrationResult r = scene.align(prior);
     EXPECT_EQ(r.status, RegistrationStatus::not_aligned);
     EXPECT_EQ(r.reason, RegistrationReason::contradicts_prior) << to_string(r.reason);
-    EXPECT_FALSE(r.has_candidate);
+    EXPECT_FALSE(r.has_pose());
     EXPECT_TRUE(r.modes.empty());
-    EXPECT_EQ(r.score, 0);
+    EXPECT_EQ(r.confidence, 0);
   }
 }
 

@@ -79,7 +79,7 @@ TEST(Symmetry, BareCubeRoom) {
       register_moved(cube(random), cube(random), truth, Eigen::Vector3f::Zero());
   EXPECT_FALSE(r.aligned());
   EXPECT_EQ(r.reason, RegistrationReason::symmetric);
-  EXPECT_LT(r.score, 0.3);
+  EXPECT_LT(r.confidence, 0.3);
   // A cube has 24 rotations. Those among the modes are distinct by construction.
   int symmetric = 0;
   for (const RegistrationMode& mode : r.modes) {
@@ -101,7 +101,7 @@ TEST(Symmetry, Pipe) {
   const Eigen::Isometry3d truth = test::random_pose(random);
   const RegistrationResult r =
       register_moved(pipe(random), pipe(random), truth, Eigen::Vector3f::Zero());
-  EXPECT_FALSE(r.aligned()) << r.score;
+  EXPECT_FALSE(r.aligned()) << r.confidence;
   ASSERT_GT(r.modes.size(), 4u);
   // Turned about z, or z upside down, and shifted by nothing: all the same to a pipe.
   int symmetric = 0;
@@ -122,7 +122,7 @@ TEST(Symmetry, CorridorHasAWeakDirection) {
     Points a = corridor(random, -7, 3), b = corridor(random, -3, swap ? 5.0f : 9.0f);
     const RegistrationResult r =
         register_moved(swap ? a : b, swap ? b : a, truth, Eigen::Vector3f(0.9f, 0, 1.2f));
-    EXPECT_FALSE(r.aligned()) << r.score;
+    EXPECT_FALSE(r.aligned()) << r.confidence;
     ASSERT_FALSE(r.modes.empty());
     const PoseEvidence& e = r.modes.front().evidence;
     EXPECT_LT(e.information_eigenvalues[0], 1e-2 * e.information_eigenvalues[2]);
@@ -140,7 +140,7 @@ TEST(Symmetry, FurnishedRoomIsStiff) {
   const RegistrationResult r =
       register_moved(test::scan_room(random), target, truth, Eigen::Vector3f(1.5f, 2.5f, 1.7f));
   EXPECT_TRUE(r.aligned());
-  EXPECT_GT(r.score, 0.9);
+  EXPECT_GT(r.confidence, 0.9);
   const PoseEvidence& e = r.modes.front().evidence;
   EXPECT_GT(e.information_eigenvalues[0], 1e-2 * e.information_eigenvalues[3]);
 }

@@ -31,8 +31,7 @@ struct FakeLevels {
     run.push_back(quality);
     const RegistrationSettings o = resolve(RegistrationOptions{}).with_quality(quality);
     RegistrationResult result;
-    result.has_candidate = true;
-    result.score = confidence(quality);
+    result.confidence = confidence(quality);
     result.target_from_source.setIdentity();
     result.target_from_source.translation().x() = shift(quality);
     result.timings.match = std::pow(per_match * o.compatibility.max_matches, exponent);
@@ -96,7 +95,7 @@ TEST(TimeBudget, TheMostConfidentLevelIsReturned) {
   const TimedResult out = levels.within(5000);
   EXPECT_GT(out.highest_quality, 0u);
   EXPECT_EQ(out.quality, 0u);
-  EXPECT_DOUBLE_EQ(out.result.score, 0.8);
+  EXPECT_DOUBLE_EQ(out.result.confidence, 0.8);
 }
 
 TEST(TimeBudget, PredictionsFollowTheStages) {

@@ -149,7 +149,7 @@ TEST(UnknownViewpoint, WhatIsSaidIsTaken) {
   view.viewpoint_count = 1;
   EXPECT_THROW(prepare(cpu(), view), InvalidArgument);
   view.infer_viewpoint = true;
-  EXPECT_EQ(decision(view), ViewpointSource::said);
+  EXPECT_EQ(decision(view), ViewpointSource::given);
 }
 
 TEST(UnknownViewpoint, AModelIsClosedAndItsNormalsPointOutwards) {
@@ -170,7 +170,7 @@ TEST(UnknownViewpoint, MovedScansAlign) {
     const auto source = moved(a, room_scan(1)), target = moved(b, room_scan(2));
     const RegistrationResult result = align(cpu(), PointCloudView(source), PointCloudView(target));
     ASSERT_TRUE(result.aligned()) << to_string(result.source_viewpoint) << " "
-                                  << to_string(result.target_viewpoint) << " " << result.score;
+                                  << to_string(result.target_viewpoint) << " " << result.confidence;
     EXPECT_LT(test::rotation_error_degrees(b * a.inverse(), result.target_from_source), 1);
   }
 }
@@ -211,7 +211,7 @@ TEST(UnknownViewpoint, VerificationTriesBothSidesAsAlignDoes) {
                target = of_known_sides(inside_and_outside(2)[k]);
     ASSERT_EQ(source.statistics().viewpoint, ViewpointSource::none);
     const RegistrationResult found = align(cpu(), source, target);
-    ASSERT_TRUE(found.aligned()) << found.score;
+    ASSERT_TRUE(found.aligned()) << found.confidence;
     std::vector<UnalignedIsometry3d> poses;
     for (const RegistrationMode& mode : found.modes) poses.push_back(mode.target_from_source);
     const auto verified = verify_poses(cpu(), source, target, poses);
@@ -231,7 +231,7 @@ TEST(UnknownViewpoint, GivenCorrespondencesAreTriedWithBothSides) {
     std::vector<Correspondence> same;
     for (std::uint32_t i = 0; i < source.size(); ++i) same.push_back({i, i});
     const RegistrationResult result = align(cpu(), source, target, same);
-    ASSERT_TRUE(result.aligned()) << result.score;
+    ASSERT_TRUE(result.aligned()) << result.confidence;
     // Normals of the wrong side would agree nowhere.
     EXPECT_GT(result.modes[0].evidence.source_overlap, 0.9);
   }

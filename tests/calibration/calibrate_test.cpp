@@ -347,9 +347,8 @@ TEST(Labels, LoopsDecideFromEvenOdds) {
       mode.confidence = i == 2 && j == 3 ? 0.05 : 0.95;
       if (j == 1) mode.target_from_source.translation().x() = 1;
       RegistrationResult result;
-      result.has_candidate = true;
       result.target_from_source = mode.target_from_source;
-      result.score = mode.confidence;
+      result.confidence = mode.confidence;
       result.modes = {mode};
       pairs.push_back({j, i});
       results.push_back(result);
@@ -370,13 +369,12 @@ TEST(Labels, LoopsDecideFromEvenOdds) {
 
 TEST(Labels, EquivalentPosesAreCorrect) {
   RegistrationResult result;
-  result.has_candidate = true;
   result.modes.resize(2);
   result.modes[0].confidence = 0.6;
   result.modes[0].target_from_source.translation().x() = 1;
   result.modes[1].confidence = 0.3;
   result.target_from_source = result.modes[0].target_from_source;
-  result.score = 0.6;
+  result.confidence = 0.6;
   const std::vector<Eigen::Vector3f> points = {{0, 0, 0}, {1, 0, 0}};
   const Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();
   EXPECT_FALSE(calibration::is_correct(result, truth, points, 0.2));

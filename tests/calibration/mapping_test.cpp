@@ -74,12 +74,12 @@ void expect_mapped(const Align& align) {
   const RegistrationResult plain = align(options_with({}));
   ASSERT_FALSE(plain.modes.empty());
   ASSERT_EQ(plain.equivalent_poses(), 1u);
-  ASSERT_GT(plain.score, 0.5);
-  ASSERT_LT(plain.score, 1.0);
+  ASSERT_GT(plain.confidence, 0.5);
+  ASSERT_LT(plain.confidence, 1.0);
   for (const ConfidenceCalibration& calibration : kCalibrations) {
     const RegistrationResult mapped = align(options_with(calibration));
-    EXPECT_EQ(mapped.score, calibration(plain.score));
-    EXPECT_NE(mapped.score, plain.score);
+    EXPECT_EQ(mapped.confidence, calibration(plain.confidence));
+    EXPECT_NE(mapped.confidence, plain.confidence);
     ASSERT_EQ(mapped.modes.size(), plain.modes.size());
     double sum = 0;
     for (std::size_t k = 0; k < mapped.modes.size(); ++k) {
@@ -92,7 +92,7 @@ void expect_mapped(const Align& align) {
                   mapped.modes[j].confidence >= b.confidence);
     }
     EXPECT_LE(sum, 1.0 + 1e-12);
-    EXPECT_EQ(mapped.aligned(), mapped.score >= 0.5);
+    EXPECT_EQ(mapped.aligned(), mapped.confidence >= 0.5);
   }
 }
 
@@ -157,8 +157,8 @@ TEST(Calibration, AlignGivenCorrespondences) {
                  options_with(calibration));
   };
   const RegistrationResult plain = with({});
-  ASSERT_TRUE(plain.has_candidate);
-  EXPECT_EQ(with({0.5, -1}).score, ConfidenceCalibration({0.5, -1})(plain.score));
+  ASSERT_TRUE(plain.has_pose());
+  EXPECT_EQ(with({0.5, -1}).confidence, ConfidenceCalibration({0.5, -1})(plain.confidence));
 }
 
 TEST(Calibration, AlignWithin) {
@@ -166,7 +166,7 @@ TEST(Calibration, AlignWithin) {
   const auto within = [&](const ConfidenceCalibration& calibration) {
     return align_within(scene().context, scene().source, scene().target, 1e-3,
                         options_with(calibration))
-        .result.score;
+        .result.confidence;
   };
   const double plain = within({});
   ASSERT_GT(plain, 0);
@@ -195,7 +195,7 @@ TEST(Calibration, VerifyPoses) {
   EXPECT_EQ(verify_poses(scene().context, scene().source, scene().target,
                          {found.target_from_source}, options)[0]
                 .confidence,
-            found.score);
+            found.confidence);
 }
 
 TEST(Calibration, TheIdentityLeavesTheBits) {

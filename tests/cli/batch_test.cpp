@@ -105,7 +105,7 @@ TEST_F(Batch, JsonHasEveryFieldOfEveryPair) {
     EXPECT_EQ(pair["i"], i);
     EXPECT_EQ(pair["j"], j);
     if (++j == kScans + 2) j = ++i + 1;
-    EXPECT_TRUE(pair["score"].is_number());
+    EXPECT_TRUE(pair["confidence"].is_number());
     for (const char* count :
          {"source_points", "target_points", "correspondences", "hypotheses", "survivors", "scored",
           "points_scored", "consensus", "inliers", "refine_iterations"})
@@ -178,10 +178,10 @@ TEST_F(Batch, CamerasThatDoNotMatchTheFragments) {
 }
 
 TEST_F(Batch, MinimalScoreIsTheThreshold) {
-  ASSERT_EQ(batch("all", {"--min-score", "0"}).status, 0);
+  ASSERT_EQ(batch("all", {"--min-confidence", "0"}).status, 0);
   // Every pair that has a pose is in the log now.
   EXPECT_EQ(evaluation::read_log(out_ / "all.log").size(), 6u + kScans);
-  const Outcome none = batch("none", {"--min-score", "1"});
+  const Outcome none = batch("none", {"--min-confidence", "1"});
   EXPECT_EQ(none.status, 1) << "no pair aligned";
   EXPECT_TRUE(evaluation::read_log(out_ / "none.log").empty());
   const auto options = json_of(out_ / "none.json")["options"];
@@ -202,13 +202,13 @@ TEST_F(Batch, MinimalScoreIsTheThreshold) {
 TEST_F(Batch, MinimalScoreOfLoopsmartIsTheInlierRatio) {
   const auto reported = [&](const std::string& score) {
     const std::string name = "ratio" + score;
-    batch(name, joined(kLoopsmart, {"--min-score", score}));
+    batch(name, joined(kLoopsmart, {"--min-confidence", score}));
     const auto json = json_of(out_ / (name + ".json"));
     EXPECT_EQ(json["options"]["min_confidence"], std::stod(score));
     std::size_t expected = 0;
     for (const auto& pair : json["pairs"]) {
-      EXPECT_EQ(pair["score"], pair["inlier_ratio"]);
-      expected += pair["score"].get<double>() >= std::stod(score) && pair["score"] > 0;
+      EXPECT_EQ(pair["confidence"], pair["inlier_ratio"]);
+      expected += pair["confidence"].get<double>() >= std::stod(score) && pair["confidence"] > 0;
     }
     const std::size_t found = evaluation::read_log(out_ / (name + ".log")).size();
     EXPECT_EQ(found, expected) << score;

@@ -75,7 +75,7 @@ TEST_F(EarlyChecks, AModelWithoutNormalsIsNamedWithARemedy) {
 }
 
 TEST_F(EarlyChecks, OfEveryResultBeforeAnyPicture) {
-  const std::string good = out_.write("good.json", R"({"pairs": [{"i": 0, "j": 1, "score": 0.9,
+  const std::string good = out_.write("good.json", R"({"pairs": [{"i": 0, "j": 1, "confidence": 0.9,
       "status": "aligned", "reason": "none", "ms": {"total": 1},
       "T_ij": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}]})");
   const std::string bad = out_.write("bad.json", "{\"pairs\": 3}");

@@ -36,8 +36,8 @@ TEST_F(Knowledge, ViewpointsAreSaidOrNot) {
     return json[cloud]["prepare"]["viewpoint"];
   };
   const auto said = aligned({"--source-viewpoint", "0,0,0"});
-  EXPECT_EQ(decision(said, "source"), "said");
-  EXPECT_NE(decision(said, "target"), "said");
+  EXPECT_EQ(decision(said, "source"), "given");
+  EXPECT_NE(decision(said, "target"), "given");
   const auto none = aligned({"--source-viewpoint", "none", "--target-viewpoint", "none"});
   EXPECT_EQ(decision(none, "source"), "none");
   EXPECT_EQ(decision(none, "target"), "none");
@@ -153,11 +153,12 @@ TEST(MeshInput, EveryVerbSamplesTheFaces) {
   expect_holds(info.out, {"20,000, with normals", "--voxel-size"});
   expect_holds(info.err, {a, "faces were sampled by 20,000 points"});
   // Whatever the confidence: the reading of the faces is tested.
-  const Outcome pair = run(joined({"register", a, b, "--min-score", "0"}, size));
+  const Outcome pair = run(joined({"register", a, b, "--min-confidence", "0"}, size));
   EXPECT_EQ(pair.status, 0) << pair.out << pair.err;
   const std::string json = folder / "r.json";
   const Outcome batch = run(joined(
-      {"batch", folder.path(), "-o", folder / "r.log", "--json", json, "--min-score", "0"}, size));
+      {"batch", folder.path(), "-o", folder / "r.log", "--json", json, "--min-confidence", "0"},
+      size));
   EXPECT_EQ(batch.status, 0) << batch.out << batch.err;
   expect_holds(batch.err, {a, b, "faces were sampled"});
   for (const auto& fragment : json_of(json)["fragments"]) EXPECT_GT(fragment["points"], 2000);

@@ -69,7 +69,7 @@ TEST_F(Library, GivesThePairOfTheCommand) {
   const RegistrationResult result = pair(source, target);
   EXPECT_EQ(json.at("target_from_source").get<std::vector<double>>(),
             numbers(result.target_from_source.matrix()));
-  EXPECT_EQ(json.at("score").get<double>(), result.score);
+  EXPECT_EQ(json.at("confidence").get<double>(), result.confidence);
 }
 
 TEST_F(Library, GivesTheBatchOfTheCommand) {

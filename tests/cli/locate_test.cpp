@@ -153,9 +153,9 @@ TEST_F(Locate, ThresholdsOfPairsAreNotThoseOfPlaces) {
   EXPECT_EQ(threshold({}), 0.75);
   // As good as any other number, though it is the default of pairs.
   EXPECT_EQ(threshold({"--set", "min_confidence=0.5"}), 0.5);
-  EXPECT_EQ(threshold({"--min-score", "0.5"}), 0.5);
-  EXPECT_EQ(threshold({"--min-score", "1"}), 1);
-  EXPECT_EQ(locate({scan, map}, {"--min-score", "1"}).status, 1);
+  EXPECT_EQ(threshold({"--min-confidence", "0.5"}), 0.5);
+  EXPECT_EQ(threshold({"--min-confidence", "1"}), 1);
+  EXPECT_EQ(locate({scan, map}, {"--min-confidence", "1"}).status, 1);
   const std::string calibration = other.write(
       "c.json",
       R"({"gpureg":"calibration","slope":1,"offset":0,"voxel_size":5,"risk":{"min_confidence":0.2}})");

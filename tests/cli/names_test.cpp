@@ -99,7 +99,8 @@ TEST_F(Names, OfABatchAreBesideItsLogAndInItsReport) {
   ASSERT_EQ(
       run({"report", out_ / "r.json", "--clouds", scans_.path(), "-o", out_ / "r.html"}).status, 0);
   const std::string page = content_of(out_ / "r.html");
-  expect_holds(page, {R"("i":"kitchen north.ply")", "che \\u003cb>.ply, score ", R"("png":")"});
+  expect_holds(page,
+               {R"("i":"kitchen north.ply")", "che \\u003cb>.ply, confidence ", R"("png":")"});
   EXPECT_EQ(page.find("che <b>"), std::string::npos);
 }
 

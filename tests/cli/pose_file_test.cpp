@@ -100,18 +100,20 @@ TEST_F(PoseFile, OptionsThatDoNothingWithAGivenPoseAreRefused) {
       expect_refused(joined(arguments, option), {option.front(), "does nothing", why});
   };
   const std::vector<std::string> seed = {"--seed", "2"}, quality = {"--quality", "3"},
-                                 score = {"--min-score", "0.9"}, near = {"--near", "0,0,0,1"},
-                                 up = {"--up", "0,0,1"}, set = {"--set", "accept_symmetry=true"},
+                                 confidence = {"--min-confidence", "0.9"},
+                                 near = {"--near", "0,0,0,1"}, up = {"--up", "0,0,1"},
+                                 set = {"--set", "accept_symmetry=true"},
                                  json = {"--json", out_ / "r.json"};
-  refused({"change", scan, scan, "--pose", pose}, {seed, quality, score, near, up, set}, "--pose");
+  refused({"change", scan, scan, "--pose", pose}, {seed, quality, confidence, near, up, set},
+          "--pose");
   refused({"locate", scan, "--save-map", out_ / "m.gpureg"},
-          {seed, quality, score, near, up, set, json}, "without a scan");
+          {seed, quality, confidence, near, up, set, json}, "without a scan");
   for (const char* verb : {"locate", "change"})
     refused({verb, scan, map}, {{"--set", "prepare.normal_radius=3"}}, "a saved map is prepared");
-  refused({"audit", folder_.path(), poses}, {score}, "in an audit");
+  refused({"audit", folder_.path(), poses}, {confidence}, "in an audit");
   refused({"audit", folder_.path(), poses}, {seed, quality}, "without --mend");
-  refused({"audit", folder_.path(), poses, "--mend", out_ / "m.txt"}, {score}, "in an audit");
-  refused({"calibrate", folder_.path(), "-o", out_ / "c.json"}, {score}, "in a calibration");
+  refused({"audit", folder_.path(), poses, "--mend", out_ / "m.txt"}, {confidence}, "in an audit");
+  refused({"calibrate", folder_.path(), "-o", out_ / "c.json"}, {confidence}, "in a calibration");
   refused({"register", scan, scan, "--initial", initial, "--ignore-alternatives"}, {seed, quality},
           "--ignore-alternatives");
   refused({"reconstruct", folder_.path(), "-o", out_ / "map", "--no-map"},

@@ -221,8 +221,8 @@ TEST_F(ReconstructCommand, DamagedResultsAreNamed) {
   document["pairs"][4] = document["pairs"][0];
   refused(document, "pairs[4]", "stands twice");
   document = whole;
-  document["pairs"][0]["score"] = "high";
-  refused(document, "pairs[0]", "score");
+  document["pairs"][0]["confidence"] = "high";
+  refused(document, "pairs[0]", "confidence");
 }
 
 TEST_F(ReconstructCommand, AFullDiskIsNamedAndTheJournalStays) {

@@ -35,8 +35,8 @@ TEST_F(Register, ReportsTheResult) {
   EXPECT_EQ(outcome.err, "");
   expect_holds(outcome.out,
                {source_, target_, "backend  cpu", "status   aligned", "target_from_source\n",
-                "score", "inliers", "correspondences", "hypotheses 512", "survivors", "features",
-                "depth maps", "match", "refine"});
+                "confidence", "inliers", "correspondences", "hypotheses 512", "survivors",
+                "features", "depth maps", "match", "refine"});
 }
 
 TEST_F(Register, NumbersOfAFarPoseStayApart) {
@@ -184,7 +184,7 @@ TEST_F(Register, Json) {
   const auto& result = json["result"];
   EXPECT_EQ(result["status"], "aligned");
   EXPECT_EQ(result["reason"], "none");
-  EXPECT_GT(result["score"], 0.5);
+  EXPECT_GT(result["confidence"], 0.5);
   EXPECT_EQ(result["target_from_source"].size(), 16u);
   EXPECT_EQ(result["information_redwood"].size(), 36u);
   // Redwood counts the correspondences in the first entry, Open3D behind the rotation block;
@@ -211,7 +211,7 @@ TEST_F(Register, VerifiesPosesOfAFile) {
   expect_holds(outcome.out, {"status   aligned", "pose 1 of " + poses, "pose 2 of " + poses});
   const auto verified = json_of(path)["result"];
   EXPECT_EQ(verified["target_from_source"], found["target_from_source"]);
-  EXPECT_EQ(verified["score"], found["score"]);
+  EXPECT_EQ(verified["confidence"], found["confidence"]);
   EXPECT_EQ(verified["modes"].size(), 2u);
   EXPECT_EQ(verified["modes"][0]["evidence"]["overlap"], found["modes"][0]["evidence"]["overlap"]);
   EXPECT_LT(verified["modes"][1]["confidence"], 0.1);
@@ -244,17 +244,17 @@ TEST_F(Register, SeedDecidesAndThreadsDoNot) {
 
 TEST_F(Register, MinimalScoreIsTheThreshold) {
   const std::string path = folder_ / "r.json";
-  const Outcome none = align({"--min-score", "1", "--json", path});
+  const Outcome none = align({"--min-confidence", "1", "--json", path});
   EXPECT_EQ(none.status, 1);
-  expect_holds(none.out,
-               {"not_aligned: confidence_too_low", "try      ", "--min-score", "best candidate"});
+  expect_holds(none.out, {"not_aligned: confidence_too_low", "try      ", "--min-confidence",
+                          "best candidate"});
   EXPECT_EQ(json_of(path)["options"]["min_confidence"], 1.0);
-  align(joined(kLoopsmart, {"--min-score", "0.9", "--json", path}));
+  align(joined(kLoopsmart, {"--min-confidence", "0.9", "--json", path}));
   EXPECT_EQ(json_of(path)["options"]["min_confidence"], 0.9);
   const std::string other = write_cloud(folder_, "sticks.ply", sticks());
   const std::vector<std::string> without_overlap = joined({"register", source_, other}, kSmall);
   EXPECT_EQ(run(without_overlap).status, 1);
-  EXPECT_EQ(run(joined(without_overlap, {"--min-score", "0"})).status, 0);
+  EXPECT_EQ(run(joined(without_overlap, {"--min-confidence", "0"})).status, 0);
 }
 
 TEST_F(Register, Overlay) {

@@ -162,7 +162,7 @@ TEST_F(Resume, ChangedOptionsAreRefused) {
     EXPECT_EQ(content_of(journal("r")), before);
   };
   refused({"--seed", "2"}, {"cannot resume", "options.seed was 1, now 2"});
-  refused({"--min-score", "0.6"}, {"options.min_confidence was 0.5, now 0.6"});
+  refused({"--min-confidence", "0.6"}, {"options.min_confidence was 0.5, now 0.6"});
   refused({"--preset", "loopsmart"}, {"cannot resume", "options."});
   const std::string pairs = out_.write("pairs.txt", "0 1\n");
   refused({"--pairs", pairs}, {"pair cloud_bin_0.ply cloud_bin_2.ply is none of this run"});

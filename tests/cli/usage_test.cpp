@@ -92,9 +92,9 @@ TEST_F(Usage, OtherValues) {
   expect_refused(with({"--preset", "fast"}), {"--preset", "fast", "loopsmart"});
   expect_refused(with({"--backend", "gpu"}), {"--backend", "gpu", "cuda"});
   for (const char* score : {"-0.1", "1.01", "nan", "high"}) {
-    expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--min-score", score},
-                   {"--min-score", score});
-    expect_refused(with({"--min-score", score}), {"--min-score", score});
+    expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--min-confidence", score},
+                   {"--min-confidence", score});
+    expect_refused(with({"--min-confidence", score}), {"--min-confidence", score});
   }
 }
 

@@ -42,8 +42,8 @@ void match(PairOutcome& outcome, const PreparedState& source, const PreparedStat
         outcome, mode, confidence::spectra_of({&mode}, source, target).front(), source, target,
         false)};
     return confidence::rank_modes(evidence,
-                                  confidence::available_evidence(evidence, ViewpointSource::said,
-                                                                 ViewpointSource::said))
+                                  confidence::available_evidence(evidence, ViewpointSource::given,
+                                                                 ViewpointSource::given))
         .front();
   };
   std::uint32_t inliers = 0;
@@ -190,7 +190,7 @@ TEST(DegeneracySearch, APoseThatStaysAwayIsAnAlternative) {
   };
   EXPECT_GE(alternatives(a), 1);
   EXPECT_GT(alternatives(a), alternatives(b));
-  EXPECT_LE(a.score, b.score);
+  EXPECT_LE(a.confidence, b.confidence);
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ std::vector<Report> reports_of(const std::vector<std::pair<double, bool>>& score
   std::vector<Report> reports;
   for (std::size_t k = 0; k < scores.size(); ++k) {
     Report report{0, 2 + static_cast<int>(k)};
-    report.score = scores[k].first;
+    report.confidence = scores[k].first;
     if (!scores[k].second) report.transform(0, 3) = 1;
     reports.push_back(report);
   }

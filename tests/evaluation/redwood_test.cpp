@@ -176,7 +176,7 @@ TEST(Evaluate, TheStrictRankingHasItsOwnScoreWhereThereIsOne) {
   Evaluation result = evaluate(truth, reports, true);
   EXPECT_EQ(result.strict_ranked->recall_at_99, 0.5);
   EXPECT_EQ(result.geometric_ranked->recall_at_99, 0.5);
-  reports[0].strict_score.reset();
+  reports[0].overlap_confidence.reset();
   result = evaluate(truth, reports, true);
   EXPECT_EQ(result.strict_ranked->recall_at_99, 0);  // 0.9 stands before 0.7
   EXPECT_EQ(result.strict_ranked->recall_at_50, 0.5);

@@ -22,12 +22,13 @@ namespace gpureg::fuzz {
 namespace {
 
 void check_result(const RegistrationResult& r) {
-  if (!(r.score >= 0 && r.score <= 1)) broken("the score is a probability or a ratio");
+  if (!(r.confidence >= 0 && r.confidence <= 1))
+    broken("the confidence is a probability or a ratio");
   for (const RegistrationMode& mode : r.modes) {
     if (!(mode.confidence >= 0 && mode.confidence <= 1)) broken("a confidence is a probability");
     if (!(mode.overlap_confidence <= mode.confidence)) broken("overlap only lowers the confidence");
   }
-  if (!r.has_candidate) {
+  if (!r.has_pose()) {
     if (r.aligned()) broken("an aligned pair has a pose");
     return;
   }
@@ -253,10 +254,9 @@ class Host {
         for (double& eigenvalue : mode.evidence.information_eigenvalues) eigenvalue = number();
       out.modes.push_back(mode);
     }
-    out.has_candidate = !out.modes.empty();
-    if (!out.has_candidate) return out;
+    if (out.modes.empty()) return out;
     out.target_from_source = out.modes[0].target_from_source;
-    out.score = out.modes[0].confidence;
+    out.confidence = out.modes[0].confidence;
     return out;
   }
 
@@ -310,10 +310,9 @@ void run_consistency(std::string_view input) {
           static_cast<double>(bytes.number(3)), static_cast<double>(bytes.number(3));
       result.modes.push_back(mode);
     }
-    result.has_candidate = !result.modes.empty();
-    if (result.has_candidate) {
+    if (!result.modes.empty()) {
       result.target_from_source = result.modes[0].target_from_source;
-      result.score = result.modes[0].confidence;
+      result.confidence = result.modes[0].confidence;
     }
     results.push_back(result);
   }

@@ -69,7 +69,7 @@ void read_pairs_of_journal(std::string_view bytes) {
     read(content, [](const std::string& path) {
       const JournalContents journal = read_journal(path);
       for (const RegistrationResult& result : journal.results) {
-        if (result.has_candidate && !result.target_from_source.matrix().allFinite())
+        if (result.has_pose() && !result.target_from_source.matrix().allFinite())
           broken("poses are finite");
         if (sets::result_of(sets::bytes_of(result), path).modes.size() != result.modes.size())
           broken("a result survives its file");

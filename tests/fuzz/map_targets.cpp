@@ -203,14 +203,13 @@ void run_audit(std::string_view input) {
     for (std::uint32_t k = bytes.below(9); k > 0; --k) {
       pairs.push_back({bytes.below(size + 1), bytes.below(size + 1)});
       RegistrationResult result;
-      result.has_candidate = bytes.below(8) != 0;
-      if (result.has_candidate) {
+      if (bytes.below(8) != 0) {
         result.target_from_source = pose_of(bytes, 1);
-        result.score = static_cast<double>(bytes.take<std::uint8_t>()) / 255;
+        result.confidence = static_cast<double>(bytes.take<std::uint8_t>()) / 255;
         result.status = RegistrationStatus::aligned;
         RegistrationMode mode;
         mode.target_from_source = result.target_from_source;
-        mode.confidence = result.score;
+        mode.confidence = result.confidence;
         result.modes.push_back(mode);
       }
       results.push_back(result);

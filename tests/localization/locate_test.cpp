@@ -65,7 +65,7 @@ TEST(Locate, FindsAScanAmongTiles) {
   EXPECT_GE(map.tiles(), 3u);
   const Query query(5, 4, 3);
   const LocateResult result = locate(context(), query.scan.view(), map);
-  EXPECT_EQ(result.tiles, 0u) << "the plan is enough";
+  EXPECT_EQ(result.stage, SearchStage::from_above) << "the plan is enough";
   EXPECT_EQ(result.status, LocateStatus::found);
   ASSERT_FALSE(result.poses.empty());
   EXPECT_LT(query.error(result.poses.front()), kClose);
@@ -77,10 +77,11 @@ TEST(Locate, MoreConfidenceThanUsualTakesTheWholeSearch) {
   LocateOptions options = LocateOptions{RegistrationOptions{kVoxel}};
   const LocateResult usual = locate(context(), {query.scan.view()}, map, options).front();
   EXPECT_EQ(usual.status, LocateStatus::found);
-  EXPECT_EQ(usual.tiles, 0u);
+  EXPECT_EQ(usual.stage, SearchStage::from_above);
   options.min_confidence = 1;
   const LocateResult result = locate(context(), {query.scan.view()}, map, options).front();
   EXPECT_EQ(result.status, LocateStatus::not_found);
+  EXPECT_NE(result.stage, SearchStage::from_above);
   EXPECT_GT(result.tiles, 0u);
   ASSERT_FALSE(result.poses.empty());
   EXPECT_LT(query.error(result.poses.front()), kClose);

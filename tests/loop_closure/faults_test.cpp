@@ -126,8 +126,8 @@ TEST_F(LoopCloserFaults, CloudsOfAnotherVoxelSizeOrWithoutPoints) {
 TEST_F(LoopCloserFaults, ResultsThatAreNone) {
   const RegistrationResult good = result_of(Pose::Identity(), 0.9);
   RegistrationResult result = good;
-  result.score = kNaN;
-  refused([&] { closer.add_result(5, 1, result); }, {"result.score", "nan"});
+  result.confidence = kNaN;
+  refused([&] { closer.add_result(5, 1, result); }, {"result.confidence", "nan"});
   result = good;
   result.modes[0].confidence = 1.5;
   refused([&] { closer.add_result(5, 1, result); }, {"result.modes[0].confidence", "1.5"});

@@ -43,9 +43,8 @@ struct Set {
     RegistrationResult result;
     result.status = RegistrationStatus::aligned;
     result.reason = RegistrationReason::none;
-    result.has_candidate = true;
     result.target_from_source = wrong * right(source, target);
-    result.score = confidence;
+    result.confidence = confidence;
     RegistrationMode mode;
     mode.target_from_source = result.target_from_source;
     mode.confidence = confidence;
@@ -98,7 +97,7 @@ TEST(LoopConsistency, AWeakRightPairRises) {
   Set set(4);
   set.add_all(0.95);
   const std::size_t weak = set.find(0, 2);
-  set.results[weak].score = set.results[weak].modes[0].confidence = 0.2;
+  set.results[weak].confidence = set.results[weak].modes[0].confidence = 0.2;
   EXPECT_GT(set.score(without_aliases())[weak].confidence, 0.8);
   EXPECT_GT(set.score()[weak].confidence, 0.5);
 }
@@ -110,7 +109,7 @@ TEST(LoopConsistency, AnotherModeIsChosenWhereLoopsSupportIt) {
   RegistrationResult& r = set.results[alias];
   r.modes.push_back(r.modes[0]);
   r.modes[1].confidence = 0.1;
-  r.score = r.modes[0].confidence = 0.5;
+  r.confidence = r.modes[0].confidence = 0.5;
   r.target_from_source = r.modes[0].target_from_source = kWrong * set.right(0, 3);
   const PairConsistency out = set.score()[alias];
   EXPECT_EQ(out.mode, 1u);
@@ -138,7 +137,7 @@ TEST(LoopConsistency, WithoutLoopsNothingChanges) {
   set.results.push_back(skipped);
   const auto out = set.score();
   for (std::size_t p = 0; p < out.size(); ++p) {
-    EXPECT_EQ(out[p].confidence, set.results[p].score);
+    EXPECT_EQ(out[p].confidence, set.results[p].confidence);
     EXPECT_EQ(out[p].loops, 0u);
     EXPECT_EQ(out[p].path, 0u);
     EXPECT_EQ(out[p].mode, 0u);
@@ -319,8 +318,8 @@ TEST(LoopConsistency, BadInputIsNamed) {
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
   refused([](Set& s) { s.results.pop_back(); }, {"results has 2", "pairs has 3"});
-  refused([&](Set& s) { s.results[1].score = nan; }, {"results[1].score", "nan"});
-  refused([](Set& s) { s.results[2].score = 1.5; }, {"results[2].score", "1.5"});
+  refused([&](Set& s) { s.results[1].confidence = nan; }, {"results[1].confidence", "nan"});
+  refused([](Set& s) { s.results[2].confidence = 1.5; }, {"results[2].confidence", "1.5"});
   refused([](Set& s) { s.results[2].modes[0].confidence = -0.1; },
           {"results[2].modes[0].confidence", "-0.1"});
   refused([](Set& s) { s.results[0].target_from_source.matrix()(0, 0) = 7; },

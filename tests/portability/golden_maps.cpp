@@ -38,7 +38,7 @@ std::vector<CalibrationSample> samples_of(const AlignedSet& set) {
   for (int k = 0; k < 40; ++k)
     for (const RegistrationResult& result : set.results) {
       CalibrationSample sample;
-      sample.confidence = result.score * (1 - 0.01 * k);
+      sample.confidence = result.confidence * (1 - 0.01 * k);
       sample.correct = (out.size() * 7 + 3) % 10 != 0 || sample.confidence > 0.8;
       sample.kind = CalibrationKind::trajectory;
       out.push_back(sample);

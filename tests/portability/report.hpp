@@ -100,8 +100,8 @@ class Report {
       const std::string pair =
           name + " " + std::to_string(pairs[k].source) + " " + std::to_string(pairs[k].target);
       line(pair + " status " + to_string(r.status) + " " + to_string(r.reason) + " score " +
-           hex(r.score));
-      if (r.has_candidate) line(pair + " pose" + pose_text(r.target_from_source));
+           hex(r.confidence));
+      if (r.has_pose()) line(pair + " pose" + pose_text(r.target_from_source));
       for (std::size_t m = 0; m < r.modes.size() && m < 3; ++m)
         line(pair + " mode " + std::to_string(m) + " confidence " + hex(r.modes[m].confidence) +
              " " + hex(r.modes[m].overlap_confidence) + " evidence" +

@@ -86,7 +86,8 @@ TEST(Path, AliasesCollapseAMapAndShow) {
 TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
   TwinBays set(in_order());
   for (std::size_t k = 0; k < set.pairs.size(); ++k)
-    if (set.pairs[k].source >= set.pairs[k].target + kBay) set.results[k].has_candidate = false;
+    if (set.pairs[k].source >= set.pairs[k].target + kBay)
+      set.results[k].target_from_source = no_pose();
   EXPECT_FALSE(set.look_alike());
 }
 
@@ -151,9 +152,9 @@ TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
   const std::vector<char> trusted = *set.trusted();
   for (std::size_t k = 0; k < set.pairs.size(); ++k) {
     const std::uint32_t gap = set.pairs[k].source - set.pairs[k].target;
-    if (!set.results[k].has_candidate) continue;
+    if (!set.results[k].has_pose()) continue;
     EXPECT_EQ(trusted[k] != 0, gap <= 4) << set.pairs[k].target << " " << set.pairs[k].source;
-    if (!trusted[k]) set.results[k].has_candidate = false;
+    if (!trusted[k]) set.results[k].target_from_source = no_pose();
   }
   const Reconstruction map = reconstruct_from_poses(kStations, set.pairs, set.results);
   EXPECT_EQ(set.wrong_edges(map), 0u);

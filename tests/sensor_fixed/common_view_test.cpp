@@ -29,7 +29,7 @@ ModeOutcome mode_with(std::uint32_t observed, std::uint32_t violating, std::uint
 }
 
 TEST(CommonView, OfScansFromOnePlaceIsTheSame) {
-  const Scan a({1, 2, 0}, ViewpointSource::origin), b({0, 2, 0}, ViewpointSource::said),
+  const Scan a({1, 2, 0}, ViewpointSource::origin), b({0, 2, 0}, ViewpointSource::given),
       unknown({0, 2, 0}, ViewpointSource::none);
   ModeOutcome different = mode_with(600, 50, 250);
   different.pose.tx = -1.05;  // the sensors are 5 cm apart
@@ -44,7 +44,7 @@ TEST(CommonView, OfScansFromOnePlaceIsTheSame) {
   ModeOutcome beside = mode_with(60, 5, 40);
   beside.pose.tx = -1;
   EXPECT_FALSE(contradicts_common_view(beside, a, b, 0.075));
-  Scan fragment({1, 2, 0}, ViewpointSource::said);
+  Scan fragment({1, 2, 0}, ViewpointSource::given);
   fragment.viewpoints.push_back({2, 2, 0});
   EXPECT_FALSE(contradicts_common_view(different, fragment, b, 0.075));
 }

@@ -34,10 +34,10 @@ TEST(SensorFixedPoints, HoldNoPoseAlongACorridor) {
                              Step{2, 0, {-0.08, -0.04, 3.36}}}) {
       const RegistrationResult r =
           align(context, clouds[step.source], clouds[step.target], options);
-      ASSERT_TRUE(r.has_candidate);
+      ASSERT_TRUE(r.has_pose());
       // The truth is good to a tenth of a metre; the voxels have two.
       EXPECT_LT((r.target_from_source.translation() - step.truth).norm(), 0.25)
-          << step.source << " to " << step.target << ", seed " << seed << ", " << r.score;
+          << step.source << " to " << step.target << ", seed " << seed << ", " << r.confidence;
       for (const RegistrationMode& mode : r.modes)
         if ((mode.target_from_source.translation() - step.truth).norm() > 0.4)
           EXPECT_LT(mode.confidence, 0.5);

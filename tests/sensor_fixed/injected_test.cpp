@@ -88,7 +88,7 @@ TEST(InjectedPoints, ChangeNoPoseAndReportNoForeignPair) {
           const bool same_room = i < kScans && j < kScans;
           if (clean[at].aligned() || !same_room)
             EXPECT_EQ(results[at].aligned(), same_room)
-                << name << " " << share << ": " << i << " " << j << ", " << results[at].score;
+                << name << " " << share << ": " << i << " " << j << ", " << results[at].confidence;
           if (!same_room) continue;
           const Eigen::Isometry3d truth =
               rooms.room_from_sensor[i].inverse() * rooms.room_from_sensor[j];

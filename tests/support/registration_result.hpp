@@ -12,9 +12,8 @@ inline RegistrationResult result_of(const UnalignedIsometry3d& target_from_sourc
   const bool reported = confidence >= 0.5;
   result.status = reported ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
   result.reason = reported ? RegistrationReason::none : RegistrationReason::confidence_too_low;
-  result.has_candidate = true;
   result.target_from_source = target_from_source;
-  result.score = confidence;
+  result.confidence = confidence;
   RegistrationMode mode;
   mode.target_from_source = target_from_source;
   mode.confidence = confidence;

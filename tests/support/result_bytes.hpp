@@ -56,7 +56,7 @@ inline void add(ByteWriter& out, const RegistrationMode& mode) {
 inline std::vector<char> bytes(const RegistrationResult& r) {
   ByteWriter out;
   out.add_matrix(r.target_from_source.matrix());
-  out.add(r.status, r.reason, r.has_candidate, r.score, r.inlier_ratio, r.inlier_rmse,
+  out.add(r.status, r.reason, r.has_pose(), r.confidence, r.inlier_ratio, r.inlier_rmse,
           r.source_viewpoint, r.target_viewpoint);
   add_fields(out, r.statistics);
   add(out, r.source_moments);

@@ -76,9 +76,8 @@ RegistrationResult result_of(const std::vector<PoseVerification>& poses, double 
     result.modes.push_back(mode);
   }
   const PoseVerification& best = poses[order.front()];
-  result.has_candidate = true;
   result.target_from_source = best.target_from_source;
-  result.score = best.confidence;
+  result.confidence = best.confidence;
   result.statistics.inliers = best.inliers;
   result.statistics.points_scored = best.points;
   result.inlier_ratio = best.inlier_ratio;
@@ -87,7 +86,7 @@ RegistrationResult result_of(const std::vector<PoseVerification>& poses, double 
   result.target_moments = best.target_moments;
   result.statistics.source_points = source_points;
   result.statistics.target_points = target_points;
-  result.reason = result.score >= min_confidence ? RegistrationReason::none : diagnose(result);
+  result.reason = result.confidence >= min_confidence ? RegistrationReason::none : diagnose(result);
   result.status = result.reason == RegistrationReason::none ? RegistrationStatus::aligned
                                                             : RegistrationStatus::not_aligned;
   return result;

@@ -66,7 +66,7 @@ void MethodOptions::add_to(Verb verb) {
       .show_default();
   verb.option("--seed", seed, "Same seed, same result, on any machine").natural().show_default();
   verb.option(
-      "--min-score", min_score,
+      "--min-confidence", min_confidence,
       "Report a pair from this confidence on (without: 0.5), a place in a map (without: 0.75); "
       "with --preset loopsmart, "
       "from this inlier ratio on (0.3). 0: every best candidate");
@@ -78,9 +78,10 @@ void MethodOptions::add_to(Verb verb) {
 }
 
 void MethodOptions::add_calibration_to(Verb verb) {
-  verb.option("--calibration", calibration,
-              "File of `gpureg calibrate`: scales the confidence to a sensor, and sets --min-score "
-              "where it promises a risk");
+  verb.option(
+      "--calibration", calibration,
+      "File of `gpureg calibrate`: scales the confidence to a sensor, and sets --min-confidence "
+      "where it promises a risk");
 }
 
 void MethodOptions::refuse(const std::vector<std::string>& options, const std::string& why) const {
@@ -109,9 +110,9 @@ void MethodOptions::note_calibration() const {
 }
 
 bool MethodOptions::sets_confidence() const {
-  return min_score.has_value() || std::any_of(set.begin(), set.end(), [](const std::string& text) {
-           return group_of(text) == "min_confidence";
-         });
+  return min_confidence.has_value() ||
+         std::any_of(set.begin(), set.end(),
+                     [](const std::string& text) { return group_of(text) == "min_confidence"; });
 }
 
 RegistrationOptions MethodOptions::registration() const {
@@ -131,10 +132,10 @@ RegistrationOptions MethodOptions::registration() const {
     options.calibration = file.calibration;
     if (file.min_confidence) options.min_confidence = *file.min_confidence;
   }
-  if (min_score && !(*min_score >= 0 && *min_score <= 1))
-    throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
+  if (min_confidence && !(*min_confidence >= 0 && *min_confidence <= 1))
+    throw InvalidArgument("--min-confidence is " + significant(*min_confidence, 6) +
                           ", expected a number from 0 to 1");
-  if (min_score) options.min_confidence = *min_score;
+  if (min_confidence) options.min_confidence = *min_confidence;
   for (const std::string& assignment : set) set_option(options, assignment);
   for (const std::string& assignment : set) refuse_idle(options, assignment);
   options.validate();

@@ -23,9 +23,9 @@ struct MethodOptions {
   unsigned threads = 0;
   std::uint32_t quality = kDefaultQuality;
   std::uint64_t seed = RegistrationOptions{}.seed;
-  std::optional<double> min_score;  ///< none: the preset's own
-  std::vector<std::string> set;     ///< further options, as "prepare.depth_maps=4"
-  std::string calibration;          ///< file of `gpureg calibrate`; empty: none
+  std::optional<double> min_confidence;  ///< none: the preset's own
+  std::vector<std::string> set;          ///< further options, as "prepare.depth_maps=4"
+  std::string calibration;               ///< file of `gpureg calibrate`; empty: none
 
   void add_to(Verb verb);
   void add_calibration_to(Verb verb);
@@ -33,7 +33,7 @@ struct MethodOptions {
   /// Whether the user gave the option, as "--quality"; add_to() was called.
   bool given(const std::string& option) const { return verb_->given(option); }
 
-  /// Whether the user gave a confidence to report from, by --min-score or --set.
+  /// Whether the user gave a confidence to report from, by --min-confidence or --set.
   bool sets_confidence() const;
   /// Refuse what would do nothing: these options where the user gave them, and any --set outside
   /// these groups. @param why as "with --pose". @throws InvalidArgument naming the option.

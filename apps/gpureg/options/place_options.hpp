@@ -28,7 +28,7 @@ struct PlaceOptions {
 void choose_voxel_size(MethodOptions& method, const MapInput& input,
                        const std::vector<std::string>& scans);
 
-/// With the confidence that --min-score or --set asks for, if one does.
+/// With the confidence that --min-confidence or --set asks for, if one does.
 localization::LocateOptions locate_options(const MethodOptions& method);
 
 }  // namespace gpureg::cli

@@ -40,7 +40,7 @@ Json entry_json(ReportEntry& entry) {
                            {"j", result.label_of(pair.j)},
                            {"aligned", pair.aligned},
                            {"reason", pair.reason},
-                           {"score", pair.score},
+                           {"confidence", pair.confidence},
                            {"has_pose", pair.transform.has_value()},
                            {"milliseconds", pair.milliseconds}});
   }

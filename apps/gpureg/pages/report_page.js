@@ -92,7 +92,7 @@ function histogram(populations, threshold) {
     svg.append(line(px(threshold), py(0), px(threshold), py(1), {stroke: '#555', 'stroke-dasharray': '4 3'}),
       label(px(threshold) + 5, py(1) + 10, 'start', 'reporting threshold'));
   populations.forEach(({name, colour, values}, k) => svg.append(...legend(px(1) - 130, py(1) + 28 + 18 * k, colour, `${name} (${values.length})`)));
-  return axes(svg, 'score', 'pairs');
+  return axes(svg, 'confidence', 'pairs');
 }
 // Mean milliseconds of each stage, in the order of their first appearance. Programs have stages of their own; "total" is none.
 function stageBars(objects, colour) {
@@ -141,14 +141,14 @@ function scoreTable(r) {
     'pair that overlaps by less than 30 % as false; the geometric rule counts it by its pose. Raw recall: recall when every best ' +
     'candidate is reported. R@P80: recall at 80 % precision. AP: average precision.')];
 }
-function scorePlot(r, evaluated) {
+function confidencePlot(r, evaluated) {
   const candidates = r.pairs.filter((pair) => pair.has_pose && (!evaluated || 'correct' in pair));
-  const scores = (wanted) => candidates.filter(wanted).map((pair) => pair.score);
-  return figure('Scores of the best candidates', histogram(evaluated ? [
-    {name: 'correct', colour: kGreen, values: scores((pair) => pair.correct)},
-    {name: 'false', colour: kRed, values: scores((pair) => !pair.correct)}] : [
-    {name: 'reported', colour: kBlue, values: scores((pair) => pair.aligned)},
-    {name: 'not reported', colour: kAmber, values: scores((pair) => !pair.aligned)}], r.options && r.options.min_confidence));
+  const confidences = (wanted) => candidates.filter(wanted).map((pair) => pair.confidence);
+  return figure('Confidence of the best candidates', histogram(evaluated ? [
+    {name: 'correct', colour: kGreen, values: confidences((pair) => pair.correct)},
+    {name: 'false', colour: kRed, values: confidences((pair) => !pair.correct)}] : [
+    {name: 'reported', colour: kBlue, values: confidences((pair) => pair.aligned)},
+    {name: 'not reported', colour: kAmber, values: confidences((pair) => !pair.aligned)}], r.options && r.options.min_confidence));
 }
 // Of pairs that the protocol evaluates; empty for those that were not reported and are not listed in gt.log.
 const outcome = (pair) => pair.aligned ? pair.correct ? 'correct' : 'false positive' : pair.in_truth ? 'missed' : '';
@@ -158,13 +158,13 @@ function pairTable(r, unfolded) {
     const value = isObject(pair.statistics) ? pair.statistics[name] : undefined;
     return typeof value === 'number' ? value.toLocaleString('en') : textOf(value);
   };
-  const rows = [...r.pairs].sort((a, b) => b.score - a.score).map((pair) => {
+  const rows = [...r.pairs].sort((a, b) => b.confidence - a.confidence).map((pair) => {
     const how = 'correct' in pair ? outcome(pair) : '';
-    return row([pair.i, pair.j, pair.status, pair.aligned ? '' : pair.reason, fixed(pair.score, 3), fixed(pair.inlier_rmse, 4),
+    return row([pair.i, pair.j, pair.status, pair.aligned ? '' : pair.reason, fixed(pair.confidence, 3), fixed(pair.inlier_rmse, 4),
       ...['correspondences', 'survivors', 'scored', 'inliers'].map((name) => count(pair, name)), fixed(pair.milliseconds, 1),
       ...(evaluated ? [how] : [])], 'td', how);
   });
-  const heads = ['target i', 'source j', 'status', 'reason', 'score', 'rmse', 'matches', 'survivors', 'scored', 'inliers', 'ms',
+  const heads = ['target i', 'source j', 'status', 'reason', 'confidence', 'rmse', 'matches', 'survivors', 'scored', 'inliers', 'ms',
     ...(evaluated ? ['evaluation'] : [])];
   return [title('Every pair'), folded(`${r.pairs.length} pairs`, unfolded && r.pairs.length <= kMaxUnfoldedRows, table(heads, rows),
     ...(evaluated ? [note('Correct: the reported pose is within 0.2 m of the ground truth. False positive: the reported pose is farther ' +
@@ -184,10 +184,10 @@ function showResult(r, unfolded) {
   const about = facts(r), kClasses = {Correct: 'correct', Aligned: 'correct', 'False positive': 'false', Missed: 'missed', 'Not aligned': 'missed'};
   add(about ? note(about) : null, make('p', {}, summary(r)));
   if (r.evaluation)
-    add(...scoreTable(r), beside(figure('Recall and precision by score threshold; dot: this run', curvePlot(
+    add(...scoreTable(r), beside(figure('Recall and precision by least confidence; dot: this run', curvePlot(
       rules(r).reverse().map((rule) => ({name: rule, colour: rule === 'strict' ? kAmber : kBlue, scores: r.evaluation[rule]})))),
-      scorePlot(r, true)));
-  else add(scorePlot(r, false));
+      confidencePlot(r, true)));
+  else add(confidencePlot(r, false));
   add(title('Time'), beside(figure('Preparation, mean per fragment', stageBars(r.fragments, kAmber)),
     figure('Alignment, mean per pair', stageBars(r.pairs.map((pair) => pair.ms || {}), kBlue))));
   if (r.pictures.length) add(title('Pictures of pairs'));

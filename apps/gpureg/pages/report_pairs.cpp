@@ -15,11 +15,13 @@ using evaluation::GroundTruth;
 constexpr double kCorrectDistance = 0.2;  // metres, Redwood's rule
 constexpr std::size_t kThresholds = 200;  // more points than a plot of 460 pixels can show
 
-bool higher_score(const PairRecord* a, const PairRecord* b) { return a->score > b->score; }
+bool more_confident(const PairRecord* a, const PairRecord* b) {
+  return a->confidence > b->confidence;
+}
 
 std::string names(const ResultFile& result, const PairRecord& pair) {
-  return result.title_of(pair.j) + " onto " + result.label_of(pair.i) + ", score " +
-         fixed(pair.score, 2);
+  return result.title_of(pair.j) + " onto " + result.label_of(pair.i) + ", confidence " +
+         fixed(pair.confidence, 2);
 }
 
 void take(std::vector<SamplePair>& samples, const ResultFile& result,
@@ -29,7 +31,7 @@ void take(std::vector<SamplePair>& samples, const ResultFile& result,
     samples.push_back({pairs[k], heading, names(result, *pairs[k]) + remark(*pairs[k])});
 }
 
-// The median score first, then the lowest one. pairs: sorted by falling score.
+// The median confidence first, then the lowest one. pairs: sorted by falling confidence.
 std::vector<const PairRecord*> median_and_lowest(const std::vector<const PairRecord*>& pairs) {
   if (pairs.size() < 2) return pairs;
   return {pairs[(pairs.size() - 1) / 2], pairs.back()};
@@ -41,25 +43,25 @@ std::string reason(const PairRecord& pair) {
 
 std::string no_remark(const PairRecord&) { return ""; }
 
-// (recall, precision) for a falling score threshold. geometric: by the geometric rule, which needs
+// (recall, precision) for a falling least confidence. geometric: by the geometric rule, which needs
 // gt_all.log.
 std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth,
                                                         const ResultFile& result, bool geometric) {
   std::vector<evaluation::Report> reports = result.reports;
   if (!geometric)
     for (evaluation::Report& report : reports) {
-      report.score = report.strict_score.value_or(report.score);
-      report.strict_score.reset();
+      report.confidence = report.overlap_confidence.value_or(report.confidence);
+      report.overlap_confidence.reset();
     }
   std::vector<double> thresholds;
-  for (const evaluation::Report& report : reports) thresholds.push_back(report.score);
+  for (const evaluation::Report& report : reports) thresholds.push_back(report.confidence);
   std::sort(thresholds.begin(), thresholds.end(), std::greater<>());
   thresholds.erase(std::unique(thresholds.begin(), thresholds.end()), thresholds.end());
   std::vector<std::pair<double, double>> curve;
   const std::size_t steps = std::min(kThresholds, thresholds.size());
   for (std::size_t s = 0; s < steps; ++s) {
     const std::size_t k = steps > 1 ? s * (thresholds.size() - 1) / (steps - 1) : 0;
-    for (evaluation::Report& report : reports) report.reported = report.score >= thresholds[k];
+    for (evaluation::Report& report : reports) report.reported = report.confidence >= thresholds[k];
     const evaluation::Evaluation e = evaluation::evaluate(truth, reports, false);
     const evaluation::Scores& scores = geometric ? *e.geometric : e.strict;
     curve.emplace_back(scores.recall(), scores.precision());
@@ -112,7 +114,7 @@ std::vector<SamplePair> samples(const ResultFile& result,
     candidate_correct[e.pair] = e.correct;
   }
   for (auto* pairs : {&correct, &false_positive, &missed})
-    std::sort(pairs->begin(), pairs->end(), higher_score);
+    std::sort(pairs->begin(), pairs->end(), more_confident);
   std::vector<SamplePair> chosen;
   take(chosen, result, median_and_lowest(correct), each, "Correct", no_remark);
   take(chosen, result, false_positive, each, "False positive", no_remark);
@@ -127,7 +129,7 @@ std::vector<SamplePair> samples(const ResultFile& result,
 std::vector<SamplePair> samples(const ResultFile& result, std::size_t most) {
   std::vector<const PairRecord*> pairs;
   for (const PairRecord& pair : result.pairs) pairs.push_back(&pair);
-  std::stable_sort(pairs.begin(), pairs.end(), higher_score);
+  std::stable_sort(pairs.begin(), pairs.end(), more_confident);
   std::vector<SamplePair> chosen;
   const std::size_t count = std::min(most, pairs.size());
   for (std::size_t k = 0; k < count; ++k) {

@@ -20,8 +20,8 @@ struct EvaluatedPair {
 std::vector<EvaluatedPair> evaluate_pairs(const evaluation::GroundTruth& truth,
                                           const ResultFile& result);
 
-/// Adds to each rule of to_json(Evaluation) a "curve": [recall, precision] for a falling score
-/// threshold.
+/// Adds to each rule of to_json(Evaluation) a "curve": [recall, precision] for a falling least
+/// confidence.
 void add_curves(Json& evaluation, const evaluation::GroundTruth& truth, const ResultFile& result);
 
 /// A pair to draw, with its caption.
@@ -33,7 +33,7 @@ struct SamplePair {
 /// Correct, false positive and missed pairs, at most `each` of a kind.
 std::vector<SamplePair> samples(const ResultFile& result,
                                 const std::vector<EvaluatedPair>& evaluated, std::size_t each);
-/// Without ground truth: at most `most` pairs by falling score, from the first to the last.
+/// Without ground truth: at most `most` pairs by falling confidence, from the first to the last.
 std::vector<SamplePair> samples(const ResultFile& result, std::size_t most);
 
 }  // namespace gpureg::cli

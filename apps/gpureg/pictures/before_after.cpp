@@ -21,10 +21,11 @@ int legend(Image& image, int x, Color color, const std::string& text) {
 }  // namespace
 
 PosedTitle pose_of(const RegistrationResult& result) {
-  if (!result.has_candidate) return {std::nullopt, "after: no pose found", nullptr};
-  const std::string score = "(score " + fixed(result.score, 2) + ")";
+  if (!result.has_pose()) return {std::nullopt, "after: no pose found", nullptr};
+  const std::string confidence = "(confidence " + fixed(result.confidence, 2) + ")";
   return {result.target_from_source,
-          result.aligned() ? "after: aligned " + score : "after: rejected " + score, nullptr};
+          result.aligned() ? "after: aligned " + confidence : "after: rejected " + confidence,
+          nullptr};
 }
 
 Image before_after(const PointCloud& source, const PointCloud& target, const PosedTitle& after,

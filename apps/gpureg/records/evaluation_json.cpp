@@ -91,8 +91,8 @@ Json pair_verdicts(const evaluation::GroundTruth& truth, const ResultFile& resul
                  {"known", at != known.end()},
                  {"tried", tried.count(pair) != 0},
                  {"reported", false},
-                 {"score", nullptr},
-                 {"strict_score", nullptr},
+                 {"confidence", nullptr},
+                 {"overlap_confidence", nullptr},
                  {"error", nullptr},
                  {"degrees", nullptr},
                  {"metres", nullptr},
@@ -102,8 +102,8 @@ Json pair_verdicts(const evaluation::GroundTruth& truth, const ResultFile& resul
       const evaluation::Report& report = *found->second;
       json["reported"] = report.reported;
       if (result.has_scores) {
-        json["score"] = report.score;
-        json["strict_score"] = report.strict_score.value_or(report.score);
+        json["confidence"] = report.confidence;
+        json["overlap_confidence"] = report.overlap_confidence.value_or(report.confidence);
       }
       if (at != known.end()) {
         const Known& right = at->second;

@@ -11,6 +11,7 @@ Json to_json(const localization::LocateResult& result, const std::string& file) 
             {"status", localization::to_string(result.status)},
             {"absent_probability", result.absent_probability},
             {"points", result.scan_points},
+            {"stage", localization::to_string(result.stage)},
             {"tiles", result.tiles},
             {"neighborhood_points", result.neighborhood_points},
             {"poses", Json::array()}};

@@ -51,13 +51,16 @@ PairRecord record_from_json(const Json& pair) {
   record.reason = text_member(pair, "reason");
   if (const auto text = pair.find("explanation"); text != pair.end() && text->is_string())
     record.explanation = text->get<std::string>();
-  record.score = finite_number(member(pair, "score"), "score");
+  // Other programs have scores, which are no probabilities.
+  const char* confidence =
+      pair.contains("confidence") || !pair.contains("score") ? "confidence" : "score";
+  record.confidence = finite_number(member(pair, confidence), confidence);
   const Json& pose = member(pair, "T_ij");
   if (!pose.is_null()) record.transform = rigid_motion(pose, "T_ij");
   // The first mode is the pose itself.
   if (const auto modes = pair.find("modes");
       modes != pair.end() && modes->is_array() && !modes->empty())
-    record.strict_score =
+    record.overlap_confidence =
         finite_number(member(modes->front(), "overlap_confidence"), "overlap_confidence");
   if (record.aligned && !record.transform)
     throw InvalidArgument("a pair is aligned, but its \"T_ij\" is null");
@@ -80,9 +83,8 @@ RegistrationResult result_from_json(const Json& pair) {
   RegistrationResult result;
   result.status = status_of(text_member(pair, "status"));
   result.reason = reason_of(record.reason);
-  result.has_candidate = record.transform.has_value();
   if (record.transform) result.target_from_source.matrix() = *record.transform;
-  result.score = record.score;
+  result.confidence = record.confidence;
   result.flat = pair.value("flat", false);
   if (const auto found = pair.find("inlier_ratio"); found != pair.end())
     result.inlier_ratio = number_or_nan(*found, "inlier_ratio");

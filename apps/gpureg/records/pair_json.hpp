@@ -21,9 +21,9 @@ struct PairRecord {
   bool aligned = false;
   std::string reason;
   std::string explanation;  ///< empty where the file has none
-  double score = 0;
+  double confidence = 0;    ///< of another program any number that ranks
   /// probability of a correct pose and of 30 % overlap, where estimated
-  std::optional<double> strict_score;
+  std::optional<double> overlap_confidence;
   std::optional<Eigen::Matrix4d> transform;  ///< T_ij: fragment j into fragment i
   double milliseconds = 0;                   ///< all stages
 };

@@ -86,7 +86,7 @@ void write_pairs(const std::string& path, const Json& head, const std::vector<Pa
     const io::ScanFile &i = folder.scans[pair.target], &j = folder.scans[pair.source];
     Json json = {{"i", i.number}, {"j", j.number}, {"name_i", i.name}, {"name_j", j.name}};
     json.update(pair_to_json(i.number, j.number, done));
-    if (with_information && done.has_candidate)
+    if (with_information && done.has_pose())
       json["information"] = to_json(done.source_moments.information_redwood());
     return json;
   };

@@ -114,8 +114,8 @@ ResultFile read_result(const std::string& path, const std::function<void(const J
       if (!name.empty()) result.names[number] = name;
     for (const PairRecord& pair : result.pairs)
       if (pair.transform)
-        result.reports.push_back(
-            {pair.i, pair.j, *pair.transform, pair.score, pair.aligned, pair.strict_score});
+        result.reports.push_back({pair.i, pair.j, *pair.transform, pair.confidence, pair.aligned,
+                                  pair.overlap_confidence});
   } else {
     result.log = evaluation::read_log(path);
     evaluation::check_entries(path, result.log);

@@ -25,7 +25,7 @@ Json read_pairs(DocumentFile& file,
 /// What `evaluate` and `report` read: RESULT.log or RESULT.json.
 struct ResultFile {
   std::string path;
-  bool has_scores = false;        ///< it was JSON: scores and unreported candidates are known
+  bool has_scores = false;        ///< it was JSON: confidences and unreported candidates are known
   std::vector<PairRecord> pairs;  ///< JSON only
   std::vector<evaluation::Report> reports;
   std::vector<evaluation::LogEntry> log;  ///< logs only

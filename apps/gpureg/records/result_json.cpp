@@ -31,12 +31,11 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
   json["status"] = to_string(result.status);
   json["reason"] = to_string(result.reason);
   if (!result.aligned()) json["explanation"] = explain(result);
-  json["score"] = result.score;
+  json["confidence"] = result.confidence;
   if (result.flat) json["flat"] = true;
   json["inlier_ratio"] = result.inlier_ratio;
   json["inlier_rmse"] = result.inlier_rmse;
-  json[pose_name] =
-      result.has_candidate ? to_json(result.target_from_source.matrix()) : Json(nullptr);
+  json[pose_name] = result.has_pose() ? to_json(result.target_from_source.matrix()) : Json(nullptr);
   if (!result.modes.empty()) {
     json["symmetry"] = {{"equivalent_poses", result.equivalent_poses()},
                         {"confidence", result.symmetry_confidence()}};
@@ -52,7 +51,7 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
 Json scale_to_json(const ScaledResult& found, const char* pose_name) {
   Json out;
   out[pose_name] = nullptr;
-  if (found.result.has_candidate) out[pose_name] = to_json(found.similarity());
+  if (found.result.has_pose()) out[pose_name] = to_json(found.similarity());
   out["scale"] = nullptr;
   if (found.scale_status != ScaleStatus::none) out["scale"] = found.scale;
   out["scale_status"] = to_string(found.scale_status);

@@ -14,8 +14,8 @@ namespace gpureg::cli {
 /// Numbers row by row.
 Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
 
-/// status, reason, explanation (of what is not aligned), score, inlier_ratio, inlier_rmse, the pose
-/// under the given name (null where there is none), statistics, ms.
+/// status, reason, explanation (of what is not aligned), confidence, inlier_ratio, inlier_rmse, the
+/// pose under the given name (null where there is none), statistics, ms.
 Json to_json(const RegistrationResult& result, const char* pose_name);
 
 /// The pose under the given name with the scale in it (null where there is none), scale,

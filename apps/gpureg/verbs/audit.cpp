@@ -215,7 +215,7 @@ void add_audit(CommandLine& line) {
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] {
     o->method.registration();  // reports bad options before the clouds are read
-    o->method.refuse({"--min-score"}, "in an audit: connections have verdicts of their own");
+    o->method.refuse({"--min-confidence"}, "in an audit: connections have verdicts of their own");
     if (o->mended.empty())
       o->method.refuse({"--seed", "--quality"}, "without --mend: no pair is aligned");
     o->method.choose_voxel_size(o->input);

@@ -137,7 +137,7 @@ int run(CalibrateOptions o) {
                           ", expected a share between 0 and 1");
   if (!o.scenes.empty() && !o.max_risk) throw InvalidArgument("--scenes needs --max-risk");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
-  o.method.refuse({"--min-score"}, "in a calibration: poses of every confidence count");
+  o.method.refuse({"--min-confidence"}, "in a calibration: poses of every confidence count");
   if (o.method.preset == "loopsmart")
     throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
   std::vector<NamedPath> inputs = {{"SCANS", o.input.path}, {"--trajectory", o.trajectory}};
@@ -218,9 +218,10 @@ void add_calibrate(CommandLine& line) {
               "Largest number of pairs of different scans")
       .natural()
       .show_default();
-  verb.option("--max-risk", o->max_risk,
-              "Also choose the --min-score that keeps the share of false reports at or below this, "
-              "for runs with this calibration");
+  verb.option(
+      "--max-risk", o->max_risk,
+      "Also choose the --min-confidence that keeps the share of false reports at or below this, "
+      "for runs with this calibration");
   verb.option(
       "--scenes", o->scenes,
       "Calibration files of other scenes: --max-risk then holds for a further scene, with 19 "

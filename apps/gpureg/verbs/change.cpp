@@ -67,7 +67,7 @@ std::optional<UnalignedIsometry3d> locate_scan(const Options& o, const Context& 
   record["located"] = to_json(result, o.scan);
   std::cout << "status   " << localization::to_string(result.status);
   if (result.status != LocateStatus::found) {
-    std::cout << ": not compared. In a place that has changed, --min-score asks for less, and "
+    std::cout << ": not compared. In a place that has changed, --min-confidence asks for less, and "
                  "--pose gives the pose\n";
     return std::nullopt;
   }
@@ -80,7 +80,7 @@ int run(Options o) {
   o.place.check();
   if (!o.pose.empty()) {
     const std::string why = "with --pose: the scan is not searched for";
-    o.method.refuse({"--quality", "--seed", "--min-score", "--up", "--near"}, why);
+    o.method.refuse({"--quality", "--seed", "--min-confidence", "--up", "--near"}, why);
     o.method.refuse_set_outside({"prepare"}, why);
   }
   check_outputs({{"--json", o.json}, {"--scan-ply", o.scan_ply}, {"--map-ply", o.map_ply}},

@@ -44,24 +44,23 @@ LoopConsistencyOptions loop_consistency_options(const ConsistencyOptions& o, con
 
 RegistrationResult result_of(const PairRecord& record, const Json& json) {
   RegistrationResult result;
-  result.has_candidate = record.transform.has_value();
-  if (result.has_candidate) result.target_from_source.matrix() = *record.transform;
-  result.score = record.score;
+  if (record.transform) result.target_from_source.matrix() = *record.transform;
+  result.confidence = record.confidence;
   result.modes = modes_from_json(json);
   return result;
 }
 
-/// Puts the confidence from all pairs beside the pair's own score. The chosen mode is first, as
+/// Puts the confidence from all pairs beside the pair's own. The chosen mode is first, as
 /// readers of results expect.
 void make_consistent(const PairRecord& record, const PairConsistency& pair, double min_confidence,
                      Json& json) {
-  json["loop_consistency"] = {{"score_alone", record.score},
+  json["loop_consistency"] = {{"confidence_alone", record.confidence},
                               {"mode", pair.mode},
                               {"loops", pair.loops},
                               {"path", pair.path}};
   if (!record.transform) return;
   const bool aligned = pair.confidence >= min_confidence;
-  json["score"] = pair.confidence;
+  json["confidence"] = pair.confidence;
   json["status"] =
       to_string(aligned ? RegistrationStatus::aligned : RegistrationStatus::not_aligned);
   if (aligned != record.aligned) {
@@ -107,9 +106,10 @@ Input read_input(const std::string& path) {
   });
   // A second run would count the same loops as new evidence.
   if (done || input.document.contains("loop_consistency"))
-    throw IoError(path +
-                  ": its scores are those of `gpureg consistency` already; give the RESULT.json of "
-                  "the batch");
+    throw IoError(
+        path +
+        ": its confidences are those of `gpureg consistency` already; give the RESULT.json of "
+        "the batch");
   return input;
 }
 
@@ -134,8 +134,8 @@ int run(const ConsistencyOptions& o) {
     make_consistent(record, consistency[k], min_confidence, input.documents[k]);
     const PairRecord after = record_from_json(input.documents[k]);
     count = std::max({count, record.i + 1, record.j + 1});
-    raised += consistency[k].confidence > record.score;
-    lowered += consistency[k].confidence < record.score;
+    raised += consistency[k].confidence > record.confidence;
+    lowered += consistency[k].confidence < record.confidence;
     changed += consistency[k].mode != 0;
     before += record.aligned;
     if (after.aligned) log.push_back({after.i, after.j, 0, *after.transform});
@@ -168,12 +168,13 @@ void add_consistency(CommandLine& line) {
       "consistency",
       "Re-score the pairs of a batch by loops of three clouds and by paths between clouds");
   verb.option("RESULT", o->result, "RESULT.json of a batch").required();
-  verb.option("--json", o->json, "The same with scores and poses in view of all pairs").required();
+  verb.option("--json", o->json, "The same with confidences and poses in view of all pairs")
+      .required();
   verb.option("-o,--output", o->log, "Redwood log of the pairs that are aligned then");
   verb.option("--voxel-size", o->voxel_size,
               "Voxel size of the tolerances; default: that of the batch");
-  verb.option("--min-score", o->min_confidence,
-              "Report a pair from this score on; default: the batch's")
+  verb.option("--min-confidence", o->min_confidence,
+              "Report a pair from this confidence on; default: the batch's")
       .between(0.0, 1.0);
   verb.run([o] { return run(*o); });
 }

@@ -118,7 +118,7 @@ void add_evaluate(CommandLine& line) {
       "counts as false; geometric: a report is correct if the pair is in gt_all.log and the "
       "pose\n"
       "within 0.2 m. raw: recall if every best candidate is reported; R@P: recall at that\n"
-      "precision; AP: average precision. Rankings go by score; the strict one by\n"
+      "precision; AP: average precision. Rankings go by confidence; the strict one by\n"
       "overlap_confidence if RESULT.json has it.\n");
   verb.run([o] { return run(*o); });
 }

@@ -168,7 +168,7 @@ void add_find(CommandLine& line) {
   verb.option("--seed", o->options.seed, "Same seed, same result, on any machine")
       .natural()
       .show_default();
-  verb.option("--min-score", o->options.min_confidence,
+  verb.option("--min-confidence", o->options.min_confidence,
               "Confidence from which a pose is an instance")
       .show_default();
   verb.option("--viewpoint", o->viewpoint.text,

@@ -33,6 +33,7 @@ using localization::LocateResult;
 using localization::LocateStatus;
 using localization::MapOptions;
 using localization::PreparedMap;
+using localization::SearchStage;
 
 /// A cloud, or scans with poses by odometry, which become one.
 struct LocatedScan {
@@ -121,11 +122,15 @@ struct Search {
   bool found() const { return status() == localization::to_string(LocateStatus::found); }
 };
 
+std::string searched_text(const LocateResult& result) {
+  if (result.stage == SearchStage::from_above) return "seen from above";
+  return std::to_string(result.tiles) + (result.tiles == 1 ? " tile" : " tiles") + " searched";
+}
+
 void print(const Search& search) {
   const LocateResult& result = search.result;
   std::cout << "scan     " << search.scan.path << ": " << grouped(result.scan_points) << " points, "
-            << result.tiles << (result.tiles == 1 ? " tile\n" : " tiles\n") << "status   "
-            << search.status();
+            << searched_text(result) << "\nstatus   " << search.status();
   if (const std::string question = search.question(); !question.empty())
     std::cout << ": " << question << "\n";
   else
@@ -197,7 +202,8 @@ int run(LocateRun o) {
   if (o.files.size() < 2) {
     const std::string why = "without a scan";
     o.method.refuse(
-        {"--quality", "--seed", "--min-score", "--viewpoint", "--up", "--near", "--json"}, why);
+        {"--quality", "--seed", "--min-confidence", "--viewpoint", "--up", "--near", "--json"},
+        why);
     o.method.refuse_set_outside({"prepare"}, why);
   }
   std::vector<NamedPath> inputs{{"MAP", o.map()}};

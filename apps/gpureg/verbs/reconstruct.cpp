@@ -322,7 +322,7 @@ void add_reconstruct(CommandLine& line) {
           "--calibration scales confidences that are made here, --results has "
           "its own");
     if (!o->results.empty() && o->no_audit)
-      o->method.refuse({"--seed", "--quality", "--min-score"},
+      o->method.refuse({"--seed", "--quality", "--min-confidence"},
                        "with --results and --no-audit: no pair is aligned");
     if (o->no_map) o->method.refuse({"--map-voxel-size"}, "with --no-map");
     check_output_folder(*o);

@@ -198,10 +198,10 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
             << "status   " << to_string(r.status);
   print_reason(o, r);
   if (o.scaled && o.scaled->scale_status != ScaleStatus::none) print_scale(*o.scaled);
-  if (r.has_candidate) {
+  if (r.has_pose()) {
     std::cout << (r.aligned() ? "target_from_source\n" : "best candidate, target_from_source\n")
-              << pose_text(pose_matrix(o, r)) << "score    " << fixed(r.score, 3) << ", inliers "
-              << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
+              << pose_text(pose_matrix(o, r)) << "confidence " << fixed(r.confidence, 3)
+              << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
               << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << "\n";
     if (r.equivalent_poses() > 1)
       std::cout << "symmetry " << r.equivalent_poses() << " equivalent poses, confidence "
@@ -230,7 +230,7 @@ void print_verified(const RegisterOptions& o, const Context& context, const Prep
             << "status   " << to_string(r.status);
   print_reason(o, r);
   std::cout << "target_from_source" << (o.refine_initial ? ", refined" : "") << "\n"
-            << pose_text(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
+            << pose_text(r.target_from_source.matrix()) << "confidence " << fixed(r.confidence, 3)
             << ", inliers " << grouped(r.statistics.inliers) << " of "
             << grouped(r.statistics.points_scored) << " (" << percent(r.inlier_ratio)
             << " %), rmse " << significant(r.inlier_rmse, 3) << "\n";
@@ -283,9 +283,10 @@ std::string inverted(RegisterOptions o, const Context& context, const PreparedCl
   for (UnalignedIsometry3d& pose : poses) pose = pose.inverse();
   o.ignore_alternatives = true;
   const RegistrationResult inverse = verify(o, context, source, target, poses, options);
-  if (!inverse.aligned() || inverse.score <= confidence) return "";
-  return "the pose looks inverted: its inverse has a confidence of " + fixed(inverse.score, 3) +
-         "; expected target_from_source, which moves points of " + o.source + " onto " + o.target;
+  if (!inverse.aligned() || inverse.confidence <= confidence) return "";
+  return "the pose looks inverted: its inverse has a confidence of " +
+         fixed(inverse.confidence, 3) + "; expected target_from_source, which moves points of " +
+         o.source + " onto " + o.target;
 }
 
 /// Both clouds. A mesh is sampled at the spacing of the other cloud, if they have one unit.
@@ -426,7 +427,7 @@ int run(RegisterOptions o) {
     o.perhaps_other_units =
         question_units(source_cloud.view(), target_cloud.view(), kLeastUnitRatio);
     if (!o.initial.empty() && source.size() > 0 && target.size() > 0)
-      o.inverted = inverted(o, context, source, target, initial, options, result.score);
+      o.inverted = inverted(o, context, source, target, initial, options, result.confidence);
   }
   if (o.initial.empty())
     print_report(o, context, source, target, result);
@@ -452,7 +453,7 @@ int run(RegisterOptions o) {
     write_document(o.json, json);
   }
   if (!o.overlay.empty()) {
-    if (result.has_candidate)
+    if (result.has_pose())
       io::write_overlay(o.overlay, source_cloud, target_cloud, result.target_from_source);
     else
       std::cerr << "gpureg: no overlay written, as there is no pose to show" << std::endl;

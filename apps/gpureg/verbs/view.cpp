@@ -69,7 +69,7 @@ void write_pair_page(Json document, const std::string& page) {
     after = {Eigen::Isometry3d(*record.transform), record.aligned ? "after" : "best candidate"};
   const std::string found = record.aligned ? "Aligned" : "Not aligned";
   const std::string why = record.aligned ? "" : ": " + text_of(pair, "/explanation");
-  entry.pictures = {{found, entry.scene + ", score " + fixed(record.score, 2) + why,
+  entry.pictures = {{found, entry.scene + ", confidence " + fixed(record.confidence, 2) + why,
                      encode_png(before_after(read_cloud(source, 0, MeshNote::none),
                                              read_cloud(target, 0, MeshNote::none), after))}};
   entry.result.document = std::move(document);

@@ -41,8 +41,8 @@ class Default:
         result = self.gpureg.align(source, target, options=self.options, context=self.context)
         modes = list(getattr(result, "modes", []))
         return {
-            "pose": result.target_from_source if result.has_candidate else None,
-            "score": float(result.score),
+            "pose": result.target_from_source if result.has_pose else None,
+            "score": float(result.confidence),
             "aligned": bool(result.aligned),
             "strict_score": float(modes[0].overlap_confidence) if modes else None,
         }

@@ -16,5 +16,5 @@ int main() {
   const auto result = gpureg::align(gpureg::Context::cpu(), gpureg::PointCloudView(source),
                                     gpureg::PointCloudView(target), options);
   std::cout << explain(result.reason) << "\n" << result.target_from_source.matrix() << "\n";
-  return result.has_candidate ? 0 : 1;
+  return result.has_pose() ? 0 : 1;
 }

@@ -18,7 +18,7 @@ def row_of(i: int, j: int, result: RegistrationResult) -> dict[str, Any]:
         if isinstance(value, str | bool | int | float):
             row[name] = value
     row["target_from_source"] = (
-        result.target_from_source.ravel().tolist() if result.has_candidate else None
+        result.target_from_source.ravel().tolist() if result.has_pose else None
     )
     row["overlap_confidence"] = result.modes[0].overlap_confidence if result.modes else None
     row["information"] = result.source_moments.information_redwood().ravel().tolist()

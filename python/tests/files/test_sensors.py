@@ -186,7 +186,7 @@ class TestViewpoints:
 
     def test_what_is_said_is_taken(self):
         said = gpureg.register(self.CLOUD, self.CLOUD, source_viewpoint=[0, 0, 3])
-        assert said.source_viewpoint == "said"
+        assert said.source_viewpoint == "given"
         none = gpureg.register(
             self.CLOUD, self.CLOUD, source_viewpoint="none", target_viewpoint="none"
         )
@@ -216,7 +216,7 @@ class TestViewpoints:
 def test_equivalent_poses_of_a_cube():
     result = gpureg.register(mesh(), mesh(), voxel_size=0.04)
     assert result.equivalent_poses == 1 + sum(mode.equivalent for mode in result.modes)
-    assert result.symmetry_confidence >= result.score
+    assert result.symmetry_confidence >= result.confidence
     assert gpureg.RegistrationOptions(accept_symmetry=True).accept_symmetry
 
 

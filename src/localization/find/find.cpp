@@ -284,7 +284,7 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
   searched.normals = scene_cloud.normals();
   searched.origin = scene_cloud.origin();
   searched.oriented = source != ViewpointSource::none;
-  if (source == ViewpointSource::said || source == ViewpointSource::origin)
+  if (source == ViewpointSource::given || source == ViewpointSource::origin)
     searched.viewpoints = scene_cloud.viewpoints();
   registration.prepare.surface_side_distance = 0;
   registration.evidence.degeneracy_search_distance = 0;  // the evidence below tells better

@@ -150,7 +150,7 @@ void rule_out(const Edge& edge, std::vector<RegistrationResult>& results) {
   const bool none =
       std::all_of(result.modes.begin(), result.modes.end(),
                   [](const RegistrationMode& mode) { return mode.confidence < kLeastPossible; });
-  if (none) result.has_candidate = false;
+  if (none) result.target_from_source = no_pose();
 }
 
 /// Mean of the viewpoints of each scan.
@@ -173,8 +173,8 @@ std::vector<Edge> keep_to_the_path(const std::vector<char>& trusted, const std::
                                    std::vector<RegistrationResult>& results) {
   std::vector<Edge> out;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    if (trusted[k] || !results[k].has_candidate || results[k].modes.empty()) continue;
-    results[k].has_candidate = false;
+    if (trusted[k] || !results[k].has_pose() || results[k].modes.empty()) continue;
+    results[k].target_from_source = no_pose();
     const RegistrationMode& mode = results[k].modes.front();
     if (mode.confidence < options.min_edge_confidence) continue;
     Edge edge;
@@ -196,8 +196,8 @@ void hear_each_pair_alone(std::vector<RegistrationResult>& results, Options& opt
   for (RegistrationResult& result : results) {
     for (RegistrationMode& mode : result.modes)
       mode.confidence = confidence_among_copies(mode.confidence);
-    result.score = result.modes.empty() ? confidence_among_copies(result.score)
-                                        : result.modes.front().confidence;
+    result.confidence = result.modes.empty() ? confidence_among_copies(result.confidence)
+                                             : result.modes.front().confidence;
   }
 }
 

@@ -54,7 +54,7 @@ std::vector<Member> members_of(std::size_t scans, const std::vector<Pair>& pairs
                                const std::vector<RegistrationResult>& results) {
   std::vector<Member> out;
   for (std::size_t k = 0; k < std::min(pairs.size(), results.size()); ++k) {
-    if (!results[k].has_candidate || results[k].modes.empty() ||
+    if (!results[k].has_pose() || results[k].modes.empty() ||
         std::max(pairs[k].source, pairs[k].target) >= scans)
       continue;
     const RegistrationMode& mode = results[k].modes.front();

@@ -93,7 +93,7 @@ Between suggestions(const std::vector<Pair>& pairs, const std::vector<Registrati
                     const Options& options) {
   Between out;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    if (!results[k].has_candidate) continue;
+    if (!results[k].has_pose()) continue;
     const Eigen::Vector3d centre = overlap_centre(results[k]);
     for (const RegistrationMode& mode : results[k].modes)
       if (mode.confidence >= kLeastSuggested)

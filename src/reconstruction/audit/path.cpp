@@ -63,7 +63,7 @@ std::uint32_t gap_of(const Pair& pair) {
 }
 
 double confidence_of(const RegistrationResult& result) {
-  return result.has_candidate && !result.modes.empty() ? result.modes.front().confidence : 0;
+  return result.has_pose() && !result.modes.empty() ? result.modes.front().confidence : 0;
 }
 
 /// Metres from sensor to sensor.
@@ -163,7 +163,7 @@ class Growth {
     bool grown = false;
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Placement>> between;
     for (std::size_t k = 0; k < pairs.size(); ++k) {
-      if (trusted[k] || !results[k].has_candidate) continue;
+      if (trusted[k] || !results[k].has_pose()) continue;
       const std::uint32_t s = pairs[k].source, t = pairs[k].target;
       const std::vector<RegistrationMode>& modes = results[k].modes;
       for (std::size_t m = 0; m < std::min(kModes, modes.size()); ++m) {
@@ -309,13 +309,13 @@ std::optional<std::vector<char>> pairs_along_the_path(
   if (!path.known) return std::nullopt;
   std::vector<char> trusted(pairs.size(), 1);
   for (std::size_t k = 0; k < pairs.size(); ++k)
-    trusted[k] = gap_of(pairs[k]) <= path.near && results[k].has_candidate &&
+    trusted[k] = gap_of(pairs[k]) <= path.near && results[k].has_pose() &&
                  step_of(pairs[k], results[k].target_from_source, sensors) <=
                      gap_of(pairs[k]) * path.max_step;
   std::vector<RegistrationResult> of_trusted = results;
   for (int round = 0; round < kMostPasses; ++round) {
     for (std::size_t k = 0; k < results.size(); ++k)
-      of_trusted[k].has_candidate = trusted[k] && results[k].has_candidate;
+      of_trusted[k].target_from_source = trusted[k] ? results[k].target_from_source : no_pose();
     const Reconstruction map = reconstruct_from_poses(sensors.size(), pairs, of_trusted, options);
     if (!Growth(map, path, sensors).grow(pairs, results, trusted)) break;
   }

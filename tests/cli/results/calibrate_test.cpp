@@ -123,7 +123,7 @@ TEST_F(CalibrateVerb, PromisesARiskOrSaysWhatItTakes) {
     return json_of(folder_ / "r.json")["options"]["min_confidence"];
   };
   EXPECT_EQ(min_confidence({}), risk["min_confidence"]);
-  EXPECT_EQ(min_confidence({"--min-score", "0.25"}), 0.25) << "the user's own goes first";
+  EXPECT_EQ(min_confidence({"--min-confidence", "0.25"}), 0.25) << "the user's own goes first";
 
   const Outcome refused = run(joined(calibrate(path), {"--max-risk", "0.001"}));
   EXPECT_EQ(refused.status, 1);
@@ -238,10 +238,10 @@ TEST_F(CalibrateVerb, EveryVerbMapsItsConfidences) {
     const Outcome outcome = run(words);
     EXPECT_LE(outcome.status, 1) << outcome.err;  // 1: too little for a map
     const json document = json_of(folder_ / pairs);
-    return document.contains("result") ? document["result"]["score"].get<double>()
-                                       : document["pairs"][0]["score"].get<double>();
+    return document.contains("result") ? document["result"]["confidence"].get<double>()
+                                       : document["pairs"][0]["confidence"].get<double>();
   };
-  const std::vector<std::string> to_json = {"--json", folder_ / "r.json", "--min-score", "0"};
+  const std::vector<std::string> to_json = {"--json", folder_ / "r.json", "--min-confidence", "0"};
   const double plain = score_of(registered("", to_json), "r.json");
   ASSERT_GT(plain, 0.5);
   ASSERT_LT(plain, 1.0);
@@ -259,7 +259,7 @@ TEST_F(CalibrateVerb, EveryVerbMapsItsConfidences) {
 
   std::vector<std::string> batch =
       joined({"batch", folder_.path(), "-o", folder_ / "b.log", "--json", folder_ / "b.json",
-              "--quiet", "--min-score", "0"},
+              "--quiet", "--min-confidence", "0"},
              kSmall);
   const double of_batch = score_of(batch, "b.json");
   batch = joined(batch, {"--calibration", file});
@@ -268,7 +268,7 @@ TEST_F(CalibrateVerb, EveryVerbMapsItsConfidences) {
 
   std::vector<std::string> map =
       joined({"reconstruct", folder_.path(), "-o", folder_ / "map", "--no-map", "--no-refine",
-              "--quiet", "--calibration", file, "--min-score", "0"},
+              "--quiet", "--calibration", file, "--min-confidence", "0"},
              kSmall);
   EXPECT_NEAR(score_of(map, "map/pairs.json"), mapped(of_batch), 1e-12);
   expect_refused(joined(map, {"--results", folder_ / "b.json"}), {"--calibration", "--results"});

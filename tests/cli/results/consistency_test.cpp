@@ -24,7 +24,7 @@ class ConsistencyVerb : public ::testing::Test {
     const double score = modes[0]["confidence"].get<double>();
     return {{"i", i},
             {"j", j},
-            {"score", score},
+            {"confidence", score},
             {"status", score >= 0.5 ? "aligned" : "not_aligned"},
             {"reason", score >= 0.5 ? "none" : "confidence_too_low"},
             {"T_ij", modes[0]["T_ij"]},
@@ -62,12 +62,12 @@ TEST_F(ConsistencyVerb, ConsistentLoopsRaiseTheConfidence) {
   EXPECT_EQ(swapped["modes"][0]["T_ij"], pose(0));
   EXPECT_EQ(swapped["modes"][1]["T_ij"], pose(1));
   EXPECT_EQ(swapped["loop_consistency"]["mode"], 1);
-  EXPECT_EQ(swapped["loop_consistency"]["score_alone"], 0.5);
-  EXPECT_GT(weak["score"], 0.6);
+  EXPECT_EQ(swapped["loop_consistency"]["confidence_alone"], 0.5);
+  EXPECT_GT(weak["confidence"], 0.6);
   EXPECT_EQ(weak["status"], "aligned");
   EXPECT_EQ(weak["reason"], "none");
-  EXPECT_NEAR(weak["modes"][0]["overlap_confidence"].get<double>(), weak["score"].get<double>() / 2,
-              1e-12);
+  EXPECT_NEAR(weak["modes"][0]["overlap_confidence"].get<double>(),
+              weak["confidence"].get<double>() / 2, 1e-12);
   const auto log = evaluation::read_log(folder_ / "a.log");
   ASSERT_EQ(log.size(), 6u);
   EXPECT_EQ(log[0].count, 4);
@@ -85,7 +85,8 @@ TEST_F(ConsistencyVerb, TheResultOfABatch) {
   const json before = json_of(folder_ / "r.json"), after = json_of(folder_ / "a.json");
   ASSERT_EQ(after["pairs"].size(), before["pairs"].size());
   for (std::size_t k = 0; k < after["pairs"].size(); ++k)
-    EXPECT_EQ(after["pairs"][k]["loop_consistency"]["score_alone"], before["pairs"][k]["score"]);
+    EXPECT_EQ(after["pairs"][k]["loop_consistency"]["confidence_alone"],
+              before["pairs"][k]["confidence"]);
 }
 
 TEST_F(ConsistencyVerb, TheSameEvidenceCountsOnce) {

@@ -41,7 +41,7 @@ class Evaluate : public ::testing::Test {
     json pose = {1, 0, 0, wrong ? 1 : 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     return {{"i", i},
             {"j", j},
-            {"score", score},
+            {"confidence", score},
             {"status", aligned ? "aligned" : "not_aligned"},
             {"T_ij", pose},
             {"reason", aligned ? "none" : "inlier_ratio_too_low"},
@@ -206,7 +206,7 @@ TEST_F(Evaluate, FilesThatAreNoResults) {
     bad[name] = value;
     return json{{"pairs", {good, bad}}}.dump();
   };
-  for (const char* name : {"i", "j", "status", "reason", "score", "T_ij", "ms"}) {
+  for (const char* name : {"i", "j", "status", "reason", "confidence", "T_ij", "ms"}) {
     json lacking = good;
     lacking.erase(name);
     expect_bad(json{{"pairs", {good, lacking}}}.dump(), {"pairs[1]", name});
@@ -215,7 +215,7 @@ TEST_F(Evaluate, FilesThatAreNoResults) {
   expect_bad(with("j", 2.5), {"pairs[1]", "\"j\"", "2.5"});
   expect_bad(with("j", 4294967298), {"pairs[1]", "4294967298"});
   expect_bad(with("status", 1), {"pairs[1]", "\"status\""});
-  expect_bad(with("score", "high"), {"pairs[1]", "\"score\"", "high"});
+  expect_bad(with("confidence", "high"), {"pairs[1]", "\"confidence\"", "high"});
   expect_bad(with("T_ij", nullptr), {"pairs[1]", "aligned", "null"});
   expect_bad(with("T_ij", {1, 2, 3}), {"pairs[1]", "16 numbers"});
   expect_bad(with("ms", 3), {"pairs[1]"});

@@ -29,7 +29,7 @@ class HostileJson : public ::testing::Test {
 
   static std::string pair(int i, int j, const std::string& ms) {
     return "{\"i\":" + std::to_string(i) + ",\"j\":" + std::to_string(j) +
-           R"(,"status":"aligned","reason":"none","score":1,)"
+           R"(,"status":"aligned","reason":"none","confidence":1,)"
            R"("T_ij":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"ms":{"total":1)" +
            ms + "}}";
   }

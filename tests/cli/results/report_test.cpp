@@ -129,7 +129,7 @@ TEST_F(Report, TextsAreEscaped) {
 
 TEST_F(Report, ResultsOfOtherProgramsMayTellLess) {
   out_.write("r.json",
-             R"({"pairs": [{"i": 0, "j": 2, "status": "aligned", "reason": "none", "score": 2,
+             R"({"pairs": [{"i": 0, "j": 2, "status": "aligned", "reason": "none", "confidence": 2,
     "T_ij": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1], "ms": {"total": 3}}], "fragments": 3, "options": []})");
   EXPECT_EQ(page({"--ground-truth", scans_.path()}).at(0).at("fragment_count"), 0);
   out_.write("r.json", R"({"pairs": []})");

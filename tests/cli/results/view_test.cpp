@@ -33,7 +33,7 @@ TEST_F(View, PairsOfABatchByConfidenceWithPictures) {
   EXPECT_EQ(outcome.out, std::filesystem::absolute(page).string() + "\n");
   std::vector<double> scores;
   std::set<std::string> headings;
-  const std::regex caption("fragment \\d+ onto \\d+, score ([0-9.]+)");
+  const std::regex caption("fragment \\d+ onto \\d+, confidence ([0-9.]+)");
   const auto shown = data_of(content_of(page));
   for (const auto& picture : shown.at(0).at("pictures")) {
     const std::string text = picture.at("caption");

@@ -36,7 +36,7 @@ inline std::string layout() {
   MEMBER(CorrespondenceMoments, outer);
   TYPE(RegistrationResult);
   MEMBER(RegistrationResult, target_from_source);
-  MEMBER(RegistrationResult, score);
+  MEMBER(RegistrationResult, confidence);
   MEMBER(RegistrationResult, source_moments);
   MEMBER(RegistrationResult, target_moments);
   MEMBER(RegistrationResult, statistics);
@@ -46,7 +46,7 @@ inline std::string layout() {
   TYPE(evaluation::InformationEntry);
   MEMBER(evaluation::InformationEntry, information);
   TYPE(evaluation::Report);
-  MEMBER(evaluation::Report, score);
+  MEMBER(evaluation::Report, confidence);
   TYPE(evaluation::GroundTruth);
   TYPE(evaluation::Evaluation);
 #undef TYPE
