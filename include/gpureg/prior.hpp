@@ -2,12 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "gpureg/result.hpp"
 
-/// Prior knowledge of the pose of a pair.
+/// What is known of a pair before it is aligned.
 namespace gpureg {
 
 /// Vertical direction in both clouds, from an accelerometer for example. The rotation about the
@@ -31,14 +33,23 @@ struct PosePrior {
   double max_translation = 1;
 };
 
-/// Constraints on the pose of one pair. Candidates that contradict them rank last, and refined
-/// poses that contradict them are dropped. If no pose remains, the pair is not aligned, with
-/// RegistrationReason::contradicts_prior. An empty prior changes no bit of the result.
-struct RegistrationPrior {
-  std::optional<GravityPrior> gravity;
-  std::optional<PosePrior> pose;
+/// One correspondence: indices into PreparedCloud::points() of source and target.
+struct Correspondence {
+  std::uint32_t source;
+  std::uint32_t target;
+};
 
-  bool empty() const { return !gravity && !pose; }
+/// What is known of one pair. Candidates that contradict gravity or pose rank last, and refined
+/// poses that contradict them are dropped; if no pose remains, the pair is not aligned, with
+/// RegistrationReason::contradicts_prior. Both need RegistrationMethod::compatibility. An empty
+/// prior changes no bit of the result.
+struct RegistrationPrior {
+  std::optional<GravityPrior> gravity = std::nullopt;
+  std::optional<PosePrior> pose = std::nullopt;
+  /// Take the place of feature matches: any number, in any order.
+  std::optional<std::vector<Correspondence>> correspondences = std::nullopt;
+
+  bool empty() const { return !gravity && !pose && !correspondences; }
   /// @param name prefix of the field in error messages.
   /// @throws InvalidArgument naming field and value.
   void validate(const std::string& name = "prior") const;

@@ -57,39 +57,21 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
 /// @param options options.prepare is validated but not applied; each cloud keeps what it was
 ///   prepared with.
 /// @return the result; "no alignment" is a status, not an error.
+/// @param prior what is known of the pair; nothing by default.
 /// @throws InvalidArgument if a correspondence distance exceeds that of the preparation, if
-///   the dimensions of the features differ, and for clouds of another backend.
+///   the dimensions of the features differ, for clouds of another backend, for a prior out of range
+///   or with an index out of range, and for a pose or gravity with RegistrationMethod::quadruples.
 /// @throws DeviceError if the device fails.
 RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationOptions& options = {});
-
-/// align() with prior knowledge of the pose.
-/// @param prior constraints on the pose; an empty prior changes nothing.
-/// @throws InvalidArgument as align(), for a prior out of range, and for a non-empty prior with
-///   RegistrationMethod::quadruples.
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationPrior& prior,
-                         const RegistrationOptions& options = {});
+                         const PreparedCloud& target, const RegistrationOptions& options = {},
+                         const RegistrationPrior& prior = {});
 
 /// Prepares both clouds and aligns them. Prepare clouds of several pairs once
 /// instead.
 /// @throws InvalidArgument as prepare() and align() do.
 RegistrationResult align(const Context& context, const PointCloudView& source,
-                         const PointCloudView& target, const RegistrationOptions& options = {});
-
-/// One correspondence: indices into PreparedCloud::points() of source and target.
-struct Correspondence {
-  std::uint32_t source;
-  std::uint32_t target;
-};
-
-/// align() from given correspondences instead of feature matches.
-/// @param correspondences any number, in any order.
-/// @throws InvalidArgument as align(), and for an index out of range.
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target,
-                         const std::vector<Correspondence>& correspondences,
-                         const RegistrationOptions& options = {});
+                         const PointCloudView& target, const RegistrationOptions& options = {},
+                         const RegistrationPrior& prior = {});
 
 /// Indices into the clouds of a batch.
 struct Pair {
@@ -112,6 +94,7 @@ struct BatchCallbacks {
 /// @param clouds prepared clouds of the backend of the context.
 /// @param pairs indices into clouds.
 /// @param callbacks progress and cancellation.
+/// @param priors what is known of each pair, as many as pairs, or none.
 /// @return one result per pair, by pair index.
 /// @throws InvalidArgument as align(), and for an index out of range; all pairs are checked before
 ///   the first one runs.
@@ -120,16 +103,7 @@ std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,
                                             const RegistrationOptions& options = {},
-                                            const BatchCallbacks& callbacks = {});
-
-/// align_batch() with a prior for each pair.
-/// @param priors as many as pairs, or none.
-/// @throws InvalidArgument as align() with a prior, naming the pair.
-std::vector<RegistrationResult> align_batch(const Context& context,
-                                            const std::vector<PreparedCloud>& clouds,
-                                            const std::vector<Pair>& pairs,
-                                            const std::vector<RegistrationPrior>& priors,
-                                            const RegistrationOptions& options = {},
-                                            const BatchCallbacks& callbacks = {});
+                                            const BatchCallbacks& callbacks = {},
+                                            const std::vector<RegistrationPrior>& priors = {});
 
 }  // namespace gpureg

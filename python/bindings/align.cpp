@@ -29,13 +29,11 @@ RegistrationResult align_pair(const Context& context, const Cloud& source, const
                               const RegistrationOptions options,
                               const std::optional<IndexArray>& correspondences,
                               const std::optional<RegistrationPrior>& prior) {
-  std::vector<Correspondence> entries;
-  if (correspondences) entries = entries_of<Correspondence>(*correspondences, "correspondences");
-  return interruptible([&] {
-    if (correspondences) return align(context, source.prepared, target.prepared, entries, options);
-    if (prior) return align(context, source.prepared, target.prepared, *prior, options);
-    return align(context, source.prepared, target.prepared, options);
-  });
+  RegistrationPrior known = prior.value_or(RegistrationPrior());
+  if (correspondences)
+    known.correspondences = entries_of<Correspondence>(*correspondences, "correspondences");
+  return interruptible(
+      [&] { return align(context, source.prepared, target.prepared, options, known); });
 }
 
 /// Returns (results, error): an exception, by Ctrl-C or by progress, does not take the finished
@@ -57,7 +55,7 @@ py::tuple align_pairs(const Context& context, const py::list& clouds, const Inde
   callbacks.should_stop = [&] { return !tell(done); };
   py::object error = py::none();
   try {
-    interruptibly([&] { align_batch(context, prepared, pairs, priors, options, callbacks); });
+    interruptibly([&] { align_batch(context, prepared, pairs, options, callbacks, priors); });
     tell(done);
     tell.rethrow();
   } catch (const py::error_already_set& raised) {

@@ -66,7 +66,7 @@ def align(
     prior : RegistrationPrior, optional
         Gravity (``source_up``, ``target_up``, ``max_angle`` degrees) and an approximate pose
         (``target_from_source``, ``max_rotation`` degrees, ``max_translation`` of the source's
-        middle): poses that contradict it are dropped. Not together with correspondences.
+        middle): poses that contradict it are dropped.
     options : RegistrationOptions, optional
     context : Context, optional
         Default: `default_context()`. Threads may share one: their calls take turns.
@@ -93,8 +93,6 @@ def align(
     check_prepared(source, "source")
     check_prepared(target, "target")
     checked(prior, RegistrationPrior, "prior")
-    if prior is not None and correspondences is not None:
-        raise TypeError("prior: not together with correspondences")
     if correspondences is not None:
         correspondences = index_pairs(
             correspondences, "correspondences", (len(source), len(target))

@@ -38,14 +38,47 @@ Batch::Chunk Batch::next_chunk() {
   for (; variant <= variants_.size() && variant - next_ <= size; ++variant)
     if (variant == variants_.size() || starts_pair(variant)) end = variant;
   out.first = next_;
+  const RegistrationPrior nothing;
   for (; next_ < end; ++next_) {
     const PairVariant& v = variants_[next_];
     const bool swapped = swaps(*v.source, *v.target, options_);
-    out.inputs.push_back(input_of(*v.source, *v.target, swapped,
-                                  priors_.empty() ? RegistrationPrior() : priors_[v.pair]));
+    const RegistrationPrior& prior = priors_.empty() ? nothing : priors_[v.pair];
+    out.inputs.push_back(input_of(*v.source, *v.target, swapped, prior));
+    if (!prior.correspondences) continue;
+    // The other sides of a cloud have its points in its order.
+    std::vector<std::uint32_t> source, target;
+    for (const Correspondence& c : *prior.correspondences) {
+      source.push_back(swapped ? c.target : c.source);
+      target.push_back(swapped ? c.source : c.target);
+    }
+    out.inputs.back().custom_source = span_of(source);
+    out.inputs.back().custom_target = span_of(target);
+    out.given.push_back(std::move(source));
+    out.given.push_back(std::move(target));
   }
   out.outcomes.resize(out.size());
   return out;
+}
+
+void Batch::align(Chunk& chunk) const {
+  // Without correspondences there is nothing to search, and the engine takes an empty list for "use
+  // the features".
+  const auto has_nothing = [&](std::size_t k) {
+    const std::size_t pair = variants_[chunk.first + k].pair;
+    return !priors_.empty() && priors_[pair].correspondences &&
+           priors_[pair].correspondences->empty();
+  };
+  for (std::size_t begin = 0, end = 0; begin < chunk.size(); begin = ++end) {
+    while (end < chunk.size() && !has_nothing(end)) ++end;
+    if (end > begin)
+      align_all(engine_, {chunk.inputs.data() + begin, end - begin}, options_,
+                {chunk.outcomes.data() + begin, end - begin});
+    if (end == chunk.size()) break;
+    PairOutcome& outcome = chunk.outcomes[end];
+    outcome.statistics.source_points = chunk.inputs[end].source->size;
+    outcome.statistics.target_points = chunk.inputs[end].target->size;
+    outcome.reason = RegistrationReason::no_usable_features;
+  }
 }
 
 RegistrationResult Batch::result_of(const Chunk& chunk, std::size_t place) const {
@@ -80,14 +113,11 @@ std::vector<RegistrationResult> Batch::run() {
     StopScope::poll();
     Chunk now = next_chunk();
     if (now.size() == 0) break;
-    const auto align = [&] {
-      align_all(engine_, span_of(now.inputs), options_, {now.outcomes.data(), now.outcomes.size()});
-    };
     if (overlap && before.size() > 0) {
       // Callbacks stay in the thread of the caller.
-      on_threads(2, [&](std::size_t part) { part == 0 ? conclude(before) : align(); });
+      on_threads(2, [&](std::size_t part) { part == 0 ? conclude(before) : align(now); });
     } else {
-      align();
+      align(now);
     }
     before = std::move(now);
     if (!overlap) conclude(std::exchange(before, Chunk()));

@@ -28,6 +28,7 @@ class Batch {
     std::size_t first = 0;  ///< of its variants, which are all those of its pairs
     std::vector<PairInput> inputs;
     std::vector<PairOutcome> outcomes;
+    std::vector<std::vector<std::uint32_t>> given;  ///< indices of correspondences, for inputs
     std::size_t size() const { return inputs.size(); }
   };
   /// The next chunk, none behind the last one or if the caller has stopped the batch.
@@ -35,6 +36,7 @@ class Batch {
   bool starts_pair(std::size_t variant) const {
     return variant == 0 || variants_[variant].pair != variants_[variant - 1].pair;
   }
+  void align(Chunk& chunk) const;
   /// Results of an aligned chunk, to the callback too.
   void conclude(const Chunk& chunk);
   RegistrationResult result_of(const Chunk& chunk, std::size_t place) const;

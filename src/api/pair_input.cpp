@@ -5,16 +5,13 @@
 #include "common/shown.hpp"
 
 namespace gpureg {
-namespace {
 
-void check_dimensions(const PreparedState& source, const PreparedState& target) {
+void check_features(const PreparedState& source, const PreparedState& target) {
   if (source.feature_dimension != target.feature_dimension)
     throw InvalidArgument("feature_dimension differs: source has " +
                           std::to_string(source.feature_dimension) + ", target has " +
                           std::to_string(target.feature_dimension));
 }
-
-}  // namespace
 
 const PreparedState* checked_state(const Context& context, const PreparedCloud& cloud,
                                    const RegistrationSettings& options, const std::string& name) {
@@ -33,8 +30,7 @@ const PreparedState* checked_state(const Context& context, const PreparedCloud& 
 }
 
 void check_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
-                 const std::vector<Pair>& pairs, const RegistrationSettings& options,
-                 bool by_features) {
+                 const std::vector<Pair>& pairs, const RegistrationSettings& options) {
   std::vector<std::uint8_t> used(clouds.size(), 0);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     for (const std::uint32_t k : {pairs[p].source, pairs[p].target}) {
@@ -44,9 +40,6 @@ void check_pairs(const Context& context, const std::vector<PreparedCloud>& cloud
       if (!used[k]) checked_state(context, clouds[k], options, "clouds[" + std::to_string(k) + "]");
       used[k] = 1;
     }
-    if (by_features)
-      check_dimensions(*Access::state(clouds[pairs[p].source]),
-                       *Access::state(clouds[pairs[p].target]));
   }
 }
 

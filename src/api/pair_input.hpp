@@ -17,10 +17,12 @@ const PreparedState* checked_state(const Context& context, const PreparedCloud& 
                                    const RegistrationSettings& options, const std::string& name);
 
 /// Checks all pairs and their clouds, so that a long batch does not fail at its last pair. Throws
-/// InvalidArgument naming the pair or the cloud. by_features: those of a pair are compared.
+/// InvalidArgument naming the pair or the cloud.
 void check_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
-                 const std::vector<Pair>& pairs, const RegistrationSettings& options,
-                 bool by_features = true);
+                 const std::vector<Pair>& pairs, const RegistrationSettings& options);
+
+/// Throws InvalidArgument for clouds whose features cannot be matched.
+void check_features(const PreparedState& source, const PreparedState& target);
 
 /// True where the engine moves the caller's target, being the smaller cloud.
 bool swaps(const PreparedState& source, const PreparedState& target,

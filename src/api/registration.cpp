@@ -7,9 +7,7 @@
 
 #include "api/access.hpp"
 #include "api/batch.hpp"
-#include "api/engine_calls.hpp"
 #include "api/name_cloud.hpp"
-#include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/raw_cloud.hpp"
 #include "api/variants.hpp"
@@ -27,18 +25,46 @@
 namespace gpureg {
 namespace {
 
-void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pairs,
-                  const RegistrationSettings& options) {
-  if (priors.empty()) return;
-  if (priors.size() != pairs)
+/// @param name of the field in error messages.
+void check_prior(const RegistrationPrior& prior, const std::string& name,
+                 const PreparedState& source, const PreparedState& target,
+                 const RegistrationSettings& options) {
+  prior.validate(name);
+  if (prior.gravity || prior.pose)
+    require(options.method == RegistrationMethod::compatibility, "method",
+            to_string(options.method), "compatibility: only it can use priors");
+  if (!prior.correspondences) return check_features(source, target);
+  const std::vector<Correspondence>& given = *prior.correspondences;
+  require(given.size() <= limits::kMaxPoints, (name + ".correspondences.size").c_str(),
+          given.size(), "at most 2^31 - 1");
+  for (std::size_t k = 0; k < given.size(); ++k)
+    if (given[k].source >= source.size || given[k].target >= target.size)
+      throw InvalidArgument(name + ".correspondences[" + std::to_string(k) + "] is (" +
+                            std::to_string(given[k].source) + ", " +
+                            std::to_string(given[k].target) + "), but the clouds have " +
+                            std::to_string(source.size) + " and " + std::to_string(target.size) +
+                            " points");
+}
+
+/// @param several names the priors by their numbers.
+std::vector<RegistrationResult> align_all_pairs(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const RegistrationSettings& options,
+    const BatchCallbacks& callbacks, const std::vector<RegistrationPrior>& priors, bool several) {
+  options.validate();
+  if (!priors.empty() && priors.size() != pairs.size())
     throw InvalidArgument("priors has " + std::to_string(priors.size()) +
-                          " entries, but pairs has " + std::to_string(pairs));
-  for (std::size_t p = 0; p < priors.size(); ++p) {
-    priors[p].validate("priors[" + std::to_string(p) + "]");
-    if (!priors[p].empty())
-      require(options.method == RegistrationMethod::compatibility, "method",
-              to_string(options.method), "compatibility: only it can use priors");
-  }
+                          " entries, but pairs has " + std::to_string(pairs.size()));
+  check_pairs(context, clouds, pairs, options);
+  const RegistrationPrior nothing;
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    check_prior(priors.empty() ? nothing : priors[p],
+                several ? "priors[" + std::to_string(p) + "]" : "prior",
+                *Access::state(clouds[pairs[p].source]), *Access::state(clouds[pairs[p].target]),
+                options);
+  const std::vector<PairVariant> variants = variants_of(clouds, pairs);
+  Batch batch(*Access::engine(context), variants, priors, options, callbacks, pairs.size());
+  return batch.run();
 }
 
 /// Points from which another thread is worth its start.
@@ -178,127 +204,47 @@ PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
 }
 
 RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationSettings& options) {
-  return align_batch(context, {source, target}, {{0, 1}}, options).front();
+                         const PreparedCloud& target, const RegistrationSettings& options,
+                         const RegistrationPrior& prior) {
+  return align_all_pairs(context, {source, target}, {{0, 1}}, options, {}, {prior}, false).front();
 }
 
 RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationOptions& options) {
-  return align(context, source, target, resolve(options));
+                         const PreparedCloud& target, const RegistrationOptions& options,
+                         const RegistrationPrior& prior) {
+  return align(context, source, target, resolve(options), prior);
 }
 
 RegistrationResult align(const Context& context, const PointCloudView& source,
-                         const PointCloudView& target, const RegistrationSettings& settings) {
+                         const PointCloudView& target, const RegistrationSettings& settings,
+                         const RegistrationPrior& prior) {
   const std::vector<PreparedCloud> clouds =
       prepare_batch(context, {source, target}, settings.prepare, {"source", "target"});
-  return align(context, clouds[0], clouds[1], settings);
+  return align(context, clouds[0], clouds[1], settings, prior);
 }
 
 RegistrationResult align(const Context& context, const PointCloudView& source,
-                         const PointCloudView& target, const RegistrationOptions& options) {
-  return align(context, source, target, resolve(options));
-}
-
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target,
-                         const std::vector<Correspondence>& correspondences,
-                         const RegistrationOptions& options) {
-  return align(context, source, target, correspondences, resolve(options));
-}
-
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationPrior& prior,
-                         const RegistrationOptions& options) {
-  return align(context, source, target, prior, resolve(options));
-}
-
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target,
-                         const std::vector<Correspondence>& correspondences,
-                         const RegistrationSettings& options) {
-  options.validate();
-  const PreparedState& s = *checked_state(context, source, options, "source");
-  const PreparedState& t = *checked_state(context, target, options, "target");
-  require(correspondences.size() <= limits::kMaxPoints, "correspondences.size",
-          correspondences.size(), "at most 2^31 - 1");
-  const bool swapped = swaps(s, t, options);
-  std::vector<std::uint32_t> from, to;
-  for (std::size_t k = 0; k < correspondences.size(); ++k) {
-    const Correspondence& c = correspondences[k];
-    if (c.source >= s.size || c.target >= t.size)
-      throw InvalidArgument("correspondences[" + std::to_string(k) + "] is (" +
-                            std::to_string(c.source) + ", " + std::to_string(c.target) +
-                            "), but the clouds have " + std::to_string(s.size) + " and " +
-                            std::to_string(t.size) + " points");
-    from.push_back(swapped ? c.target : c.source);
-    to.push_back(swapped ? c.source : c.target);
-  }
-  // The other sides of a cloud have its points in its order.
-  RegistrationResult result;
-  for (const PairVariant& variant : variants_of({source, target}, {{0, 1}})) {
-    PairInput input = input_of(*variant.source, *variant.target, swapped);
-    input.custom_source = span_of(from);
-    input.custom_target = span_of(to);
-    PairOutcome outcome;
-    if (correspondences.empty()) {
-      // Without correspondences there is nothing to search, and the engine takes an empty list for
-      // "use the features".
-      outcome.statistics.source_points = input.source->size;
-      outcome.statistics.target_points = input.target->size;
-      outcome.reason = RegistrationReason::no_usable_features;
-    } else {
-      align_all(*Access::engine(context), {&input, 1}, options, {&outcome, 1});
-    }
-    keep_better(to_result(outcome, {*variant.source, *variant.target, swapped, options}), result);
-  }
-  return result;
-}
-
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationPrior& prior,
-                         const RegistrationSettings& options) {
-  prior.validate();
-  return align_batch(context, {source, target}, {{0, 1}}, {prior}, options).front();
+                         const PointCloudView& target, const RegistrationOptions& options,
+                         const RegistrationPrior& prior) {
+  return align(context, source, target, resolve(options), prior);
 }
 
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,
                                             const RegistrationSettings& options,
-                                            const BatchCallbacks& callbacks) {
-  return align_batch(context, clouds, pairs, std::vector<RegistrationPrior>(), options, callbacks);
+                                            const BatchCallbacks& callbacks,
+                                            const std::vector<RegistrationPrior>& priors) {
+  return align_all_pairs(context, clouds, pairs, options, callbacks, priors, true);
 }
 
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,
                                             const RegistrationOptions& options,
-                                            const BatchCallbacks& callbacks) {
-  return align_batch(context, clouds, pairs, resolve(options), callbacks);
-}
-
-std::vector<RegistrationResult> align_batch(const Context& context,
-                                            const std::vector<PreparedCloud>& clouds,
-                                            const std::vector<Pair>& pairs,
-                                            const std::vector<RegistrationPrior>& priors,
-                                            const RegistrationOptions& options,
-                                            const BatchCallbacks& callbacks) {
-  return align_batch(context, clouds, pairs, priors, resolve(options), callbacks);
-}
-
-std::vector<RegistrationResult> align_batch(const Context& context,
-                                            const std::vector<PreparedCloud>& clouds,
-                                            const std::vector<Pair>& pairs,
-                                            const std::vector<RegistrationPrior>& priors,
-                                            const RegistrationSettings& options,
-                                            const BatchCallbacks& callbacks) {
-  options.validate();
-  check_priors(priors, pairs.size(), options);
-  check_pairs(context, clouds, pairs, options);
-
-  const std::vector<PairVariant> variants = variants_of(clouds, pairs);
-  Batch batch(*Access::engine(context), variants, priors, options, callbacks, pairs.size());
-  return batch.run();
+                                            const BatchCallbacks& callbacks,
+                                            const std::vector<RegistrationPrior>& priors) {
+  return align_batch(context, clouds, pairs, resolve(options), callbacks, priors);
 }
 
 }  // namespace gpureg

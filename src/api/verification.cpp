@@ -135,7 +135,10 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
   if (poses.size() != pairs.size())
     throw InvalidArgument("poses has " + std::to_string(poses.size()) + " entries, but pairs has " +
                           std::to_string(pairs.size()));
-  check_pairs(context, clouds, pairs, options, matches.size == 0);
+  check_pairs(context, clouds, pairs, options);
+  if (matches.size == 0)
+    for (const Pair& pair : pairs)
+      check_features(*Access::state(clouds[pair.source]), *Access::state(clouds[pair.target]));
   for (std::size_t p = 0; p < poses.size(); ++p)
     for (std::size_t k = 0; k < poses[p].size(); ++k)
       require_rigid(poses[p][k], "poses[" + std::to_string(p) + "][" + std::to_string(k) + "]");

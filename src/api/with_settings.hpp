@@ -21,27 +21,17 @@ std::vector<PreparedCloud> prepare_copies(const Context& context,
                                           const std::vector<double>& scales,
                                           const PrepareSettings& settings);
 RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationSettings& settings);
+                         const PreparedCloud& target, const RegistrationSettings& settings,
+                         const RegistrationPrior& prior = {});
 RegistrationResult align(const Context& context, const PointCloudView& source,
-                         const PointCloudView& target, const RegistrationSettings& settings);
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target,
-                         const std::vector<Correspondence>& correspondences,
-                         const RegistrationSettings& settings);
-RegistrationResult align(const Context& context, const PreparedCloud& source,
-                         const PreparedCloud& target, const RegistrationPrior& prior,
-                         const RegistrationSettings& settings);
+                         const PointCloudView& target, const RegistrationSettings& settings,
+                         const RegistrationPrior& prior = {});
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,
                                             const RegistrationSettings& settings,
-                                            const BatchCallbacks& callbacks = {});
-std::vector<RegistrationResult> align_batch(const Context& context,
-                                            const std::vector<PreparedCloud>& clouds,
-                                            const std::vector<Pair>& pairs,
-                                            const std::vector<RegistrationPrior>& priors,
-                                            const RegistrationSettings& settings,
-                                            const BatchCallbacks& callbacks = {});
+                                            const BatchCallbacks& callbacks = {},
+                                            const std::vector<RegistrationPrior>& priors = {});
 std::vector<PoseVerification> verify_poses(const Context& context, const PreparedCloud& source,
                                            const PreparedCloud& target,
                                            const std::vector<UnalignedIsometry3d>& poses,

@@ -80,7 +80,7 @@ void search_tiles(const Context& context, const MapState& map, const Search& sea
     }
   }
   const std::vector<RegistrationResult> results =
-      align_batch(context, clouds, pairs, priors, search.registration);
+      align_batch(context, clouds, pairs, search.registration, {}, priors);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     Scan& scan = scans[pairs[p].source - tiles.size()];
     const std::size_t tile = tiles[pairs[p].target];

@@ -97,7 +97,7 @@ std::vector<RegistrationResult> register_all(const Context& context, const State
     pairs.push_back({place(proposal.source), place(proposal.target)});
     priors.push_back(prior_of(state, proposal));
   }
-  return align_batch(context, clouds, pairs, priors, options.registration);
+  return align_batch(context, clouds, pairs, options.registration, {}, priors);
 }
 
 }  // namespace gpureg::loop_closure

@@ -118,8 +118,8 @@ void register_all(const Context& context, const std::vector<PreparedCloud>& clou
     return callbacks.should_stop && callbacks.should_stop();
   };
   std::vector<RegistrationPrior> priors;
-  if (gravity) priors.assign(left.size(), RegistrationPrior{gravity, std::nullopt});
-  align_batch(context, clouds, pairs, priors, options, batch);
+  if (gravity) priors.assign(left.size(), RegistrationPrior{gravity});
+  align_batch(context, clouds, pairs, options, batch, priors);
   journal.flush();
 }
 

@@ -275,9 +275,11 @@ TEST(BadInput, HandlesIndicesAndDistances) {
   RegistrationSettings far = resolve(RegistrationOptions{0.2f});
   test::expect_error<InvalidArgument>([&] { align(context, cloud, cloud, far); },
                                       {"max_correspondence_distance"});
+  RegistrationPrior outside;
+  outside.correspondences = {{{0, 1000000}}};
   test::expect_error<InvalidArgument>(
-      [&] { align(context, cloud, cloud, std::vector<Correspondence>{{0, 1000000}}); },
-      {"correspondences[0]"});
+      [&] { align(context, cloud, cloud, RegistrationOptions{}, outside); },
+      {"prior.correspondences[0]"});
 }
 
 }  // namespace

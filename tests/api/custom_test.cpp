@@ -4,6 +4,7 @@
 #include "api/with_settings.hpp"
 #include "gpureg/registration.hpp"
 #include "support/expect_error.hpp"
+#include "support/result_bytes.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg {
@@ -77,6 +78,12 @@ TEST(CustomFeatures, DimensionsMustAgree) {
                                       {"feature_dimension", "4", "33"});
 }
 
+RegistrationPrior of(std::vector<Correspondence> correspondences) {
+  RegistrationPrior prior;
+  prior.correspondences = std::move(correspondences);
+  return prior;
+}
+
 TEST(CustomCorrespondences, HalfOfThemWrong) {
   const Context context = Context::cpu(2);
   TwoScans scans(8);
@@ -88,16 +95,46 @@ TEST(CustomCorrespondences, HalfOfThemWrong) {
   for (std::uint32_t k = 0; k < a.size(); ++k)
     correspondences.push_back(
         {k, k % 2 ? k : static_cast<std::uint32_t>(scans.random() % b.size())});
-  const RegistrationResult r = align(context, a, b, correspondences, options);
+  const RegistrationResult r = align(context, a, b, options, of(correspondences));
   ASSERT_TRUE(r.aligned());
   EXPECT_LT(test::translation_error(scans.pose, r.target_from_source), 0.01);
   EXPECT_EQ(r.statistics.correspondences, correspondences.size());
-  const RegistrationResult none = align(context, a, b, std::vector<Correspondence>{}, options);
+  const RegistrationResult none = align(context, a, b, options, of({}));
   EXPECT_EQ(none.reason, RegistrationReason::no_usable_features);
   EXPECT_EQ(none.statistics.source_points, a.size());
-  const RegistrationResult three =
-      align(context, a, b, std::vector<Correspondence>{{0, 0}, {1, 1}, {2, 2}}, options);
+  const RegistrationResult three = align(context, a, b, options, of({{0, 0}, {1, 1}, {2, 2}}));
   EXPECT_EQ(three.reason, RegistrationReason::no_usable_features);
+}
+
+TEST(CustomCorrespondences, InABatchBesidePairsByFeatures) {
+  const Context context = Context::cpu(2);
+  const TwoScans scans(8);
+  std::vector<Eigen::Vector3f> part = thin(scans.source);
+  part.resize(part.size() / 2);
+  const RegistrationOptions options{0.1f};
+  const std::vector<PreparedCloud> clouds = {
+      prepare(context, PointCloudView(part), options),
+      prepare(context, PointCloudView(scans.target), options)};
+  RegistrationPrior all;
+  all.correspondences.emplace();
+  for (std::uint32_t k = 0; k < clouds[0].size(); ++k) all.correspondences->push_back({k, k});
+  RegistrationPrior back;  // the engine moves the smaller cloud, here the target
+  back.correspondences.emplace();
+  for (std::uint32_t k = 0; k < clouds[0].size(); ++k) back.correspondences->push_back({2 * k, k});
+  RegistrationPrior both = all;
+  both.gravity = GravityPrior{{0, 0, 1}, {0, 0, 1}, 1};
+  const std::vector<Pair> pairs = {{0, 1}, {0, 1}, {0, 1}, {1, 0}, {0, 1}, {1, 0}};
+  const std::vector<RegistrationPrior> priors = {all, of({}), {}, back, both, {}};
+  const auto results = align_batch(context, clouds, pairs, options, {}, priors);
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const RegistrationResult alone =
+        align(context, clouds[pairs[p].source], clouds[pairs[p].target], options, priors[p]);
+    EXPECT_EQ(test::bytes(results[p]), test::bytes(alone)) << p;
+  }
+  EXPECT_EQ(results[0].statistics.correspondences, all.correspondences->size());
+  EXPECT_EQ(results[1].reason, RegistrationReason::no_usable_features);
+  EXPECT_EQ(results[3].statistics.correspondences, back.correspondences->size());
+  EXPECT_GT(results[5].statistics.correspondences, 0u);
 }
 
 }  // namespace

@@ -102,9 +102,9 @@ TEST(Origin, PriorsAreInTheFramesOfTheClouds) {
   prior.pose->max_translation = 0.5;
   prior.pose->target_from_source =
       translation(kUtmTarget) * pair.truth * translation(kUtmSource).inverse();
-  EXPECT_TRUE(align(context, source, target, prior, options).aligned());
+  EXPECT_TRUE(align(context, source, target, options, prior).aligned());
   prior.pose->target_from_source = pair.truth;
-  EXPECT_EQ(align(context, source, target, prior, options).reason,
+  EXPECT_EQ(align(context, source, target, options, prior).reason,
             RegistrationReason::contradicts_prior);
 }
 

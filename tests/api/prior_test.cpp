@@ -53,7 +53,7 @@ struct Scene {
     return prepare(context, view, options);
   }
   RegistrationResult align(const RegistrationPrior& prior) const {
-    return gpureg::align(context, source, target, prior, options);
+    return gpureg::align(context, source, target, options, prior);
   }
   RegistrationPrior about_truth(double degrees, double metres) const {
     PosePrior pose;
@@ -146,8 +146,8 @@ TEST(Prior, EmptyPriorsChangeNoBit) {
   EXPECT_EQ(test::bytes(scene.align(wide)), plain);
   // Beside others, a pair's prior is its own.
   const auto batch = align_batch(
-      scene.context, {scene.source, scene.target}, {{0, 1}, {0, 1}, {1, 0}},
-      {RegistrationPrior{}, scene.about_truth(5, 0.2), RegistrationPrior{}}, scene.options);
+      scene.context, {scene.source, scene.target}, {{0, 1}, {0, 1}, {1, 0}}, scene.options, {},
+      {RegistrationPrior{}, scene.about_truth(5, 0.2), RegistrationPrior{}});
   EXPECT_EQ(test::bytes(batch[0]), plain);
   EXPECT_EQ(test::bytes(batch[1]), test::bytes(scene.align(scene.about_truth(5, 0.2))));
 }
@@ -198,18 +198,22 @@ TEST(Prior, BadInputIsNamed) {
   const std::vector<PreparedCloud> clouds = {scene.source, scene.target};
   test::expect_error<InvalidArgument>(
       [&] {
-        align_batch(scene.context, clouds, {{0, 1}}, {RegistrationPrior{}, RegistrationPrior{}});
+        align_batch(scene.context, clouds, {{0, 1}}, RegistrationOptions{}, {},
+                    {RegistrationPrior{}, RegistrationPrior{}});
       },
       {"priors has 2", "pairs has 1"});
   RegistrationPrior bad = scene.about_truth(10, 1);
   bad.pose->max_rotation = 0;
   test::expect_error<InvalidArgument>(
-      [&] { align_batch(scene.context, clouds, {{0, 1}, {0, 1}}, {RegistrationPrior{}, bad}); },
+      [&] {
+        align_batch(scene.context, clouds, {{0, 1}, {0, 1}}, RegistrationOptions{}, {},
+                    {RegistrationPrior{}, bad});
+      },
       {"priors[1].pose.max_rotation"});
   test::expect_error<InvalidArgument>(
       [&] {
-        align(scene.context, scene.source, scene.target, scene.about_truth(10, 1),
-              RegistrationOptions::loopsmart(0.1f));
+        align(scene.context, scene.source, scene.target, RegistrationOptions::loopsmart(0.1f),
+              scene.about_truth(10, 1));
       },
       {"method", "quadruples"});
 }

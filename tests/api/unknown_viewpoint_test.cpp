@@ -228,9 +228,10 @@ TEST(UnknownViewpoint, GivenCorrespondencesAreTriedWithBothSides) {
     // The same points, in the same order.
     const SeenScan scan = inside_and_outside(1)[k];
     const auto source = of_unknown_sides(scan.points), target = of_known_sides(scan);
-    std::vector<Correspondence> same;
-    for (std::uint32_t i = 0; i < source.size(); ++i) same.push_back({i, i});
-    const RegistrationResult result = align(cpu(), source, target, same);
+    RegistrationPrior same;
+    same.correspondences.emplace();
+    for (std::uint32_t i = 0; i < source.size(); ++i) same.correspondences->push_back({i, i});
+    const RegistrationResult result = align(cpu(), source, target, {}, same);
     ASSERT_TRUE(result.aligned()) << result.confidence;
     // Normals of the wrong side would agree nowhere.
     EXPECT_GT(result.modes[0].evidence.source_overlap, 0.9);

@@ -120,7 +120,7 @@ TEST(Calibration, AlignWithAPrior) {
   RegistrationPrior prior;
   prior.pose = PosePrior{scene().truth, 60, 3};
   expect_mapped([&](const RegistrationOptions& options) {
-    return align(scene().context, scene().source, scene().target, prior, options);
+    return align(scene().context, scene().source, scene().target, options, prior);
   });
 }
 
@@ -153,8 +153,9 @@ TEST(Calibration, AlignGivenCorrespondences) {
     correspondences.push_back({i, (best + 700) % static_cast<std::uint32_t>(to.size())});
   }
   const auto with = [&](const ConfidenceCalibration& calibration) {
-    return align(scene().context, scene().source, scene().target, correspondences,
-                 options_with(calibration));
+    RegistrationPrior prior;
+    prior.correspondences = correspondences;
+    return align(scene().context, scene().source, scene().target, options_with(calibration), prior);
   };
   const RegistrationResult plain = with({});
   ASSERT_TRUE(plain.has_pose());

@@ -78,7 +78,7 @@ void run_verify(std::string_view input) {
     for (const PoseVerification& v :
          verify_poses(context, source, target, poses, options, verification))
       if (!(v.confidence >= 0 && v.confidence <= 1)) broken("a confidence is a probability");
-    check_result(align(context, source, target, prior, options));
+    check_result(align(context, source, target, options, prior));
     suggest_voxel_size({a.view(), b.view()});
   } catch (const InvalidArgument&) {
   }

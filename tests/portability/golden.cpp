@@ -77,7 +77,7 @@ Report results_of(const Context& context) {
   RegistrationPrior prior;
   prior.pose = PosePrior{results[0].target_from_source, 17, 0.7};
   const RegistrationResult guided =
-      align(context, clouds[pairs[0].source], clouds[pairs[0].target], prior, options);
+      align(context, clouds[pairs[0].source], clouds[pairs[0].target], options, prior);
   report.pairs("with prior", {pairs[0]}, {guided});
 
   VerificationOptions verification;

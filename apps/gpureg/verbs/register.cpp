@@ -410,7 +410,7 @@ int run(RegisterOptions o) {
   else if (o.time_budget)
     timed = align_within(context, source, target, *o.time_budget, options);
   else
-    timed.result = o.initial.empty() ? align(context, source, target, prior, options)
+    timed.result = o.initial.empty() ? align(context, source, target, options, prior)
                                      : verify(o, context, source, target, initial, options);
   const RegistrationResult& result = timed.result;
   if (o.scale.given() && !o.scaled) {
