@@ -14,15 +14,7 @@ VoxelSizeOrigin& voxel_size_origin() {
 }
 
 std::string voxel_size_option() {
-  switch (voxel_size_origin()) {
-    case VoxelSizeOrigin::given:
-      break;
-    case VoxelSizeOrigin::standard:
-      return "--voxel-size (default)";
-    case VoxelSizeOrigin::automatic:
-      return "--voxel-size (auto)";
-  }
-  return "--voxel-size";
+  return voxel_size_origin() == VoxelSizeOrigin::automatic ? "--voxel-size (auto)" : "--voxel-size";
 }
 
 /// Part of a longer name, of a path or of a quotation.

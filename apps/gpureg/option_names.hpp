@@ -7,7 +7,7 @@
 namespace gpureg::cli {
 
 /// Where the voxel size of this run comes from: nobody shall read of a size that he did not give.
-enum class VoxelSizeOrigin { given, standard, automatic };
+enum class VoxelSizeOrigin { given, automatic };
 void set_voxel_size_origin(VoxelSizeOrigin origin);
 
 /// The message with options in place of the fields that they set: "--voxel-size" for voxel_size,

@@ -166,6 +166,7 @@ def run(command, folder, chosen, arguments, out, more):
         aligned = folder.parent / f"{chosen.name}_aligned"
         limits = ["--prune", chosen.prune] if chosen.prune else ["--pairs", listed]
         base = [command, "reconstruct", folder, *limits, "--no-refine", "--no-map"]
+        base += ["--voxel-size", "0.05"]
         done = subprocess.run([*map(str, base), "-o", str(aligned), "--resume", "--quiet"])
         if done.returncode not in (0, 1):
             raise SystemExit(f"{chosen.name}: the alignment failed")

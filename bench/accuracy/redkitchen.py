@@ -37,6 +37,8 @@ with tempfile.TemporaryDirectory() as temporary:
             arguments,
             "batch",
             folder,
+            "--voxel-size",
+            0.05,
             "--preset",
             arguments.preset,
             "--backend",

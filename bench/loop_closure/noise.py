@@ -85,6 +85,7 @@ def batch_of(build, scene, folder, results):
             f"{out}.info",
         ]
         command += ["--pairs", f"{out}.pairs", "--json", f"{out}.json", "--quiet"]
+        command += ["--voxel-size", "0.05"]
         subprocess.run(list(map(str, command)), check=True)
     return json.loads(out.with_suffix(".json").read_text())
 

@@ -114,6 +114,7 @@ def batch_of(build: Path, scene: str, folder: Path, results: Path) -> dict:
             return json.loads((results / name).read_text())
     out = results / scene
     command = [build / "bin/gpureg", "batch", folder, "-o", f"{out}.log", "--info", f"{out}.info"]
+    command += ["--voxel-size", "0.05"]
     if scene in KEPT_ASIDE:
         Path(f"{out}.pairs").write_text(sample_of_pairs(folder, KEPT_ASIDE[scene]))
         command += ["--pairs", f"{out}.pairs"]

@@ -72,7 +72,7 @@ def run(arguments, scans, prune):
     gpureg(
         arguments,
         *("reconstruct", folder, "-o", out, "--no-refine", "--no-map", "--restart", "--quiet"),
-        *("--backend", arguments.backend, *limit),
+        *("--backend", arguments.backend, "--voxel-size", 0.05, *limit),
     )
     wall, processor = time.perf_counter() - wall, processor_seconds() - processor
     document = json.loads((out / "reconstruction.json").read_text())

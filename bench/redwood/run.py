@@ -102,6 +102,8 @@ def run_once(arguments, scene, preset, backend, seed, temporary):
         arguments,
         "batch",
         scene.fragments,
+        "--voxel-size",
+        0.05,
         "--preset",
         preset,
         "--backend",

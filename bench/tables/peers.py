@@ -328,18 +328,18 @@ KINDS = {
     "LiDAR": (
         ("street16", "street32", "street64", "kitti", "lidar"),
         "gpureg_up",
-        "`--voxel-size auto --up 0,0,1`",
+        "`--up 0,0,1`",
     ),
-    "terrestrial scanner": (("hall",), "gpureg", "`--voxel-size auto`"),
+    "terrestrial scanner": (("hall",), "gpureg", "none"),
     "objects, range scanner": (
         ("dragon",),
         "gpureg_viewpoints",
-        "`--voxel-size auto`, the viewpoints",
+        "the viewpoints",
     ),
     "CAD parts and scans": (
         ("cad_mesh",),
         "gpureg_viewpoints",
-        "the mesh as TARGET, `--voxel-size auto --set accept_symmetry=true`",
+        "the mesh as TARGET, `--set accept_symmetry=true`",
     ),
 }
 

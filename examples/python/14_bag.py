@@ -4,7 +4,7 @@
 
 pip install rosbags
 python 14_bag.py drive.bag scans --topic /points --every 10
-gpureg reconstruct scans -o map --voxel-size auto
+gpureg reconstruct scans -o map
 """
 
 import argparse

@@ -70,8 +70,12 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
 /// instead.
 /// @throws InvalidArgument as prepare() and align() do.
 RegistrationResult align(const Context& context, const PointCloudView& source,
-                         const PointCloudView& target, const RegistrationOptions& options = {},
+                         const PointCloudView& target, const RegistrationOptions& options,
                          const RegistrationPrior& prior = {});
+
+/// The same with the voxel size that suggest_voxel_size() says of both clouds; the result has it.
+RegistrationResult align(const Context& context, const PointCloudView& source,
+                         const PointCloudView& target);
 
 /// Indices into the clouds of a batch.
 struct Pair {

@@ -68,6 +68,7 @@ struct RegistrationResult {
   double confidence = 0;
   double inlier_ratio = 0;  ///< verified inliers / points scored, [0, 1]
   double inlier_rmse = 0;   ///< over the inliers, in the unit of the points
+  float voxel_size = 0;     ///< of the target's preparation; 0: the pair was not tried
   /// Moments of all correspondences within max_correspondence_distance, whatever their normals:
   /// points of the source, in its frame (Redwood's convention).
   CorrespondenceMoments source_moments;

@@ -133,6 +133,7 @@ py::dict result_state(const RegistrationResult& r) {
   state["confidence"] = r.confidence;
   state["inlier_ratio"] = r.inlier_ratio;
   state["inlier_rmse"] = r.inlier_rmse;
+  state["voxel_size"] = static_cast<double>(r.voxel_size);
   state["source_moments"] = state_of(r.source_moments);
   state["target_moments"] = state_of(r.target_moments);
   py::list modes;
@@ -155,6 +156,7 @@ RegistrationResult result_from(const py::dict& state) {
   r.confidence = state["confidence"].cast<double>();
   r.inlier_ratio = state["inlier_ratio"].cast<double>();
   r.inlier_rmse = state["inlier_rmse"].cast<double>();
+  r.voxel_size = state["voxel_size"].cast<float>();
   r.source_moments = moments_from(state["source_moments"]);
   r.target_moments = moments_from(state["target_moments"]);
   for (const auto mode : state["modes"].cast<py::list>())
@@ -212,6 +214,9 @@ void bind_registration_result(py::module_& m) {
           "with the method 'quadruples'.")
       .def_readonly("inlier_ratio", &R::inlier_ratio, "Inliers over points scored, [0, 1].")
       .def_readonly("inlier_rmse", &R::inlier_rmse, "Metres, over the inliers.")
+      .def_property_readonly(
+          "voxel_size", [](const R& r) { return shortest(r.voxel_size); },
+          "Of the target's preparation, in the unit of the points; 0: the pair was not tried.")
       .def_readonly("source_moments", &R::source_moments,
                     "Of all correspondences: points of the source, in its frame.")
       .def_readonly("target_moments", &R::target_moments,

@@ -2,7 +2,7 @@
 """Global registration of point clouds, on the CPU and on NVIDIA GPUs, with the same bits on both.
 
     import gpureg
-    result = gpureg.register(source, target, voxel_size=0.05)   # (N, 3) arrays, metres
+    result = gpureg.register(source, target)                    # (N, 3) arrays, or files
     if result.aligned:
         use(result.target_from_source)                          # (4, 4)
 

@@ -17,7 +17,7 @@ from ._contexts import checked, context_of
 from ._core import AuditOptions, Context, PreparedCloud, RegistrationOptions
 from ._map import Map, Poses
 from ._progress import Progress
-from .fragments import FragmentSet, fragment_set
+from .fragments import FragmentSet, fragment_set, options_for
 from .preparation import usable_fragments
 
 
@@ -196,6 +196,7 @@ def audit(
         ``gpureg audit``: a trajectory (TUM with numbers or names of fragments as times, KITTI, or
         poses.txt), g2o, or a Redwood log of scans or of pairs.
     options : RegistrationOptions, optional
+        Default: those of the voxel size of the map, or of the one that some fragments suggest.
     audit_options : AuditOptions, optional
         Default: those of the voxel size.
     context : Context, optional
@@ -220,11 +221,14 @@ def audit(
     >>> gpureg.audit([cloud, cloud], np.stack([np.eye(4)] * 2)).verdict
     'sound'
     """
-    options, audit_options = options_of(options, audit_options)
+    audit_options = checked_options(options, audit_options)
     context = context_of(context)
     fragments = fragment_set(fragments)
     fragments.check_files()
     matrices, islands = _map_of(poses, fragments)
+    options = options_for(
+        options, fragments, poses._options.voxel_size if isinstance(poses, Map) else 0
+    )
     clouds, kept = _usable(fragments, options, context, progress)
     record = _core.audit(
         context, clouds, matrices[kept], _islands_of(islands, kept), options, audit_options
@@ -270,11 +274,14 @@ def mend(
     >>> gpureg.mend([cloud, cloud], np.stack([np.eye(4)] * 2)).moved
     []
     """
-    options, audit_options = options_of(options, audit_options)
+    audit_options = checked_options(options, audit_options)
     context = context_of(context)
     fragments = fragment_set(fragments)
     fragments.check_files()
     matrices, islands = _map_of(poses, fragments)
+    options = options_for(
+        options, fragments, poses._options.voxel_size if isinstance(poses, Map) else 0
+    )
     found = checked(audit, Audit, "audit")
     clouds, kept = _usable(fragments, options, context, progress)
     islands, numbers = _islands_of(islands, kept), [fragments.numbers[k] for k in kept]
@@ -315,14 +322,15 @@ def _islands_of(islands: list[int], kept: list[int]) -> list[int]:
     return [counted.setdefault(islands[k], len(counted)) for k in kept]
 
 
-def options_of(
+def checked_options(
     options: RegistrationOptions | None, audit_options: AuditOptions | None
-) -> tuple[RegistrationOptions, AuditOptions]:
-    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    options.validate()
+) -> AuditOptions:
+    """What is wrong with them shall be said before the fragments are read."""
+    if options is not None:
+        checked(options, RegistrationOptions, "options").validate()
     audit_options = checked(audit_options, AuditOptions, "audit_options") or AuditOptions()
     audit_options.validate()
-    return options, audit_options
+    return audit_options
 
 
 def _map_of(poses: Any, fragments: FragmentSet) -> tuple[Poses, list[int]]:
@@ -386,6 +394,6 @@ __all__ = [
     "AuditedPair",
     "MendedMap",
     "audit",
+    "checked_options",
     "mend",
-    "options_of",
 ]

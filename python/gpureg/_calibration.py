@@ -20,7 +20,7 @@ from ._arrays import float64, several, to_numpy
 from ._contexts import checked, context_of
 from ._core import ConfidenceCalibration, Context, IoError, RegistrationOptions, __version__
 from ._progress import Progress, Report, batch_progress
-from .fragments import fragment_set
+from .fragments import fragment_set, options_for
 
 _KIND = "calibration"
 _FORMAT_VERSION = 1
@@ -196,7 +196,7 @@ def calibrate(
     max_risk : float, optional
         Also find the threshold of `control_risk` for this share, on the pairs of different scans.
     options : RegistrationOptions, optional
-        The calibration holds for its voxel size.
+        The calibration holds for its voxel size. Default: those of the one that some clouds suggest.
     context : Context, optional
     progress : bool or callable
         True: a bar of tqdm, if installed. A callable gets (pairs done, pairs).
@@ -218,7 +218,7 @@ def calibrate(
     >>> run.enough_samples, run.calibration
     (False, ConfidenceCalibration(slope=1.0, offset=0.0))
     """
-    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    checked(options, RegistrationOptions, "options")
     context = context_of(context)
     numbers = {"self_pairs": self_pairs, "scan_pairs": scan_pairs}
     for name, value in numbers.items():
@@ -235,6 +235,7 @@ def calibrate(
             raise ValueError(
                 f"poses: expected shape ({len(fragments)}, 4, 4), got {np.shape(poses)}"
             )
+    options = options_for(options, fragments)
     inputs = [fragments.load(k, options) for k in range(len(fragments))]
     with _told(progress) as tell:
         found = _core.calibrate(

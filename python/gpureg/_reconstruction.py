@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import float64, index_pairs
-from ._audit import Audit, options_of
+from ._audit import Audit, checked_options
 from ._contexts import checked, context_of
 from ._core import (
     AuditOptions,
@@ -24,7 +24,7 @@ from ._core import (
 )
 from ._map import Map
 from ._progress import Progress, Report, batch_progress
-from .fragments import FragmentSet, fragment_set
+from .fragments import FragmentSet, fragment_set, options_for
 
 
 def reconstruct(
@@ -66,7 +66,8 @@ def reconstruct(
     refine : bool
         Refine all poses together at half the voxel size.
     options : RegistrationOptions, optional
-        Of the alignment.
+        Of the alignment. Default: those of the voxel size of the results, or of the one that some
+        fragments suggest.
     map_options : ReconstructionOptions, optional
         Of the map: drift of the odometry, confidences, islands. Default: those of the voxel size.
     audit_options : AuditOptions, optional
@@ -102,7 +103,7 @@ def reconstruct(
     >>> map.islands, map.poses[1, :3, 3].round(2).tolist()  # doctest: +SKIP
     ([[0, 1, 2]], [-0.5, 0.0, 0.0])
     """
-    options, audit_options = options_of(options, audit_options)
+    audit_options = checked_options(options, audit_options)
     map_options = (
         checked(map_options, ReconstructionOptions, "map_options") or ReconstructionOptions()
     )
@@ -111,6 +112,10 @@ def reconstruct(
     fragments = fragment_set(fragments)
     fragments.check_files()
     rows, values = _pair_results(fragments, pairs, results)
+    known = next((value.voxel_size for value in values or () if value.voxel_size), 0)
+    if known == 0 and journal is not None:
+        known = _core.voxel_size_of_journal(os.fspath(journal))
+    options = options_for(options, fragments, known)
     steps = _Steps(progress)
     try:
         made = _core.reconstruct_set(

@@ -22,7 +22,7 @@ from . import _core
 from ._batch.folder import INFORMATION, JOURNAL, LOG, TABLE, RunFolder, read_table
 from ._core import BackendUnavailable, Context, RegistrationOptions
 from ._progress import Progress, batch_progress
-from .fragments import fragment_set
+from .fragments import fragment_set, options_for
 
 MEMORY = 4 << 30
 
@@ -127,6 +127,7 @@ def register_all(
     output : path
         Folder of the run: pairs.journal, and of it results.parquet, result.log and result.info.
     options : RegistrationOptions, optional
+        Default: those of the voxel size that some fragments suggest.
     contexts : sequence of Context, optional
         One thread each. Default: one per CUDA device, or the CPU.
     progress : bool or callable
@@ -198,8 +199,8 @@ def open_run(
     memory: int,
 ) -> RunFolder:
     """Everything that can be wrong is looked at before the first pair runs."""
-    options = options or RegistrationOptions()
-    options.validate()
+    if options is not None:
+        options.validate()
     if isinstance(memory, bool) or not isinstance(memory, numbers.Real):  # 4e9 bytes are fine
         raise TypeError(f"memory: expected a number, got {memory!r}")
     if not memory >= 1:
@@ -208,7 +209,11 @@ def open_run(
     chosen = fragments.choose_pairs(pairs)
     if len(chosen) == 0:
         raise ValueError(f"pairs: there is none (fragments: {len(fragments)})")
-    return RunFolder(Path(output), fragments, options, chosen, resume)
+    journal = os.fspath(Path(output) / JOURNAL)
+    known = _core.voxel_size_of_journal(journal) if resume else 0
+    return RunFolder(
+        Path(output), fragments, options_for(options, fragments, known), chosen, resume
+    )
 
 
 def conclude(run: RunFolder, begin: float, unusable: dict[int, str]) -> BatchRun:

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import CoreCloud, core_cloud, several, to_numpy
+from ._arrays import CoreCloud, core_cloud, host_points, several, to_numpy
+from ._contexts import checked
 from ._core import IoError, MapOptions, RegistrationOptions
 
 _PIECE = 1 << 20  # bytes of a file that are in memory while its fingerprint is made
@@ -201,6 +202,18 @@ class FragmentSet:
             digest.update(np.ascontiguousarray(viewpoints).tobytes())
         return digest.hexdigest()
 
+    def _voxel_size(self) -> float:
+        """What `gpureg.suggest_voxel_size` says of at most eight of them, evenly chosen; 0.05 where
+        these suggest none. One that cannot be read has no say.
+        """
+        clouds, count = [], min(len(self), 8)
+        for k in range(count):
+            try:
+                clouds.append(host_points(self._sources[k * len(self) // count], "fragments"))
+            except (OSError, ValueError):
+                continue
+        return _core.suggest_voxel_size(clouds).voxel_size or RegistrationOptions().voxel_size
+
     def choose_pairs(self, pairs: Any = "all") -> npt.NDArray[np.int64]:
         """(M, 2) positions i < j.
 
@@ -275,6 +288,16 @@ def _names_of(numbers: Sequence[int], sources: Sequence[Any]) -> list[str]:
 def _file_of(path: str | os.PathLike[str]) -> str:
     """Without the scan that it names: "a.e57" of "a.e57#2"."""
     return _core.scan_path(os.fspath(path))[0]
+
+
+def options_for(
+    options: RegistrationOptions | None, fragments: FragmentSet, voxel_size: float = 0
+) -> RegistrationOptions:
+    """The given ones; else those of a voxel size that is known, or that the fragments suggest."""
+    if options is None:
+        return RegistrationOptions(voxel_size=voxel_size or fragments._voxel_size())
+    checked(options, RegistrationOptions, "options").validate()
+    return options
 
 
 def fragment_set(fragments: Any) -> FragmentSet:

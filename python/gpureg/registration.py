@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -298,7 +298,7 @@ def align_scaled_batch(
 def register(
     source: Any,
     target: Any,
-    voxel_size: float | Literal["auto"] | None = ...,
+    voxel_size: float | None = ...,
     *,
     quality: int | None = ...,
     seed: int | None = ...,
@@ -314,7 +314,7 @@ def register(
 def register(
     source: Any,
     target: Any,
-    voxel_size: float | Literal["auto"] | None = ...,
+    voxel_size: float | None = ...,
     *,
     quality: int | None = ...,
     seed: int | None = ...,
@@ -327,7 +327,7 @@ def register(
 def register(
     source: Any,
     target: Any,
-    voxel_size: float | Literal["auto"] | None = None,
+    voxel_size: float | None = None,
     *,
     quality: int | None = None,
     seed: int | None = None,
@@ -345,9 +345,9 @@ def register(
     ----------
     source, target : (N, 3) arrays, paths, or whatever `prepare` takes as points
         Metres, or any unit that voxel_size has, too. Pictures: ``gpureg register --image``.
-    voxel_size : float or "auto", optional
-        Edge of the downsampling voxel; every other length follows from it. Default:
-        ``RegistrationOptions().voxel_size``, 0.05. "auto": what `suggest_voxel_size` says.
+    voxel_size : float, optional
+        Edge of the downsampling voxel; every other length follows from it. Default: what
+        `suggest_voxel_size` says; the result has it.
     quality : int, optional
         From 0, the fastest, to 10, the highest recall. Default: 5.
     seed : int, optional
@@ -404,17 +404,14 @@ def register(
     if time_budget_ms is not None:
         time_budget_ms = milliseconds_of(time_budget_ms, "time_budget_ms")
     if options is None:
-        if isinstance(voxel_size, str) and voxel_size == "auto":
-            # Of a source in another unit nothing follows for the target's.
-            suggestion = suggest_voxel_size([source, target] if ends is None else [target])
-            if suggestion.reason != "none":
-                raise ValueError(f"voxel_size: 'auto', but {suggestion.explanation}")
-            voxel_size = suggestion.voxel_size
-        elif isinstance(voxel_size, str):
-            raise TypeError(f"voxel_size: expected a number or 'auto', got {voxel_size!r}")
         options = RegistrationOptions()
         if voxel_size is not None:
             options.voxel_size = number_of(voxel_size, "voxel_size")
+        elif suggested := suggest_voxel_size(
+            # Of a source in another unit nothing follows for the target's.
+            [source, target] if ends is None else [target]
+        ).voxel_size:
+            options.voxel_size = suggested  # else there is nothing to align, in voxels of any size
         if quality is not None:
             options.quality = whole_number_of(quality, "quality", 0)
         if seed is not None:

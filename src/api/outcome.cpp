@@ -213,6 +213,7 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
   result.target_viewpoint = pair.target.statistics.viewpoint;
   result.statistics.swapped = pair.swapped;
   result.flat = pair.flat();
+  result.voxel_size = pair.target.options.unit;
   if (pair.swapped) {
     std::swap(result.statistics.source_points, result.statistics.target_points);
     if (result.reason == RegistrationReason::too_few_source_points)

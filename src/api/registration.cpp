@@ -17,6 +17,7 @@
 #include "common/limits.hpp"
 #include "common/validate.hpp"
 #include "flat/extruded.hpp"
+#include "gpureg/voxel_size.hpp"
 #include "sensor_fixed/known.hpp"
 #include "sensor_fixed/range_shells.hpp"
 #include "spacing/stray_points.hpp"
@@ -227,6 +228,17 @@ RegistrationResult align(const Context& context, const PointCloudView& source,
                          const PointCloudView& target, const RegistrationOptions& options,
                          const RegistrationPrior& prior) {
   return align(context, source, target, resolve(options), prior);
+}
+
+RegistrationResult align(const Context& context, const PointCloudView& source,
+                         const PointCloudView& target) {
+  RegistrationOptions options;
+  for (std::size_t k = 0; k < 2; ++k)
+    naming_cloud({"source", "target"}, 2, k, [&] { (k == 0 ? source : target).validate(); });
+  // Without a suggestion there is nothing to align, in voxels of any size.
+  const VoxelSizeSuggestion suggestion = suggest_voxel_size({source, target});
+  if (suggestion.valid()) options.voxel_size = suggestion.voxel_size;
+  return align(context, source, target, options);
 }
 
 std::vector<RegistrationResult> align_batch(const Context& context,

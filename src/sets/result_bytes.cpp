@@ -104,6 +104,7 @@ void visit(Archive& archive, Result& r) {
   archive.number(r.confidence);
   archive.number(r.inlier_ratio);
   archive.number(r.inlier_rmse);
+  archive.number(r.voxel_size);
   moments(archive, r.source_moments);
   moments(archive, r.target_moments);
   archive.size(r.modes);

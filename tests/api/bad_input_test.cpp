@@ -212,7 +212,9 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
       },
       {"names has 1 entries", "2"});
   test::expect_error<InvalidArgument>(
-      [&] { align(context, PointCloudView(points), PointCloudView(good)); },
+      [&] {
+        align(context, PointCloudView(points), PointCloudView(good), RegistrationOptions{0.05f});
+      },
       {"source: nearly all"});
   PointCloudView lying(good);
   lying.point_stride = 1;

@@ -168,7 +168,8 @@ TEST(UnknownViewpoint, MovedScansAlign) {
   for (int k = 0; k < 3; ++k) {
     const Eigen::Isometry3d a = random_pose(random), b = random_pose(random);
     const auto source = moved(a, room_scan(1)), target = moved(b, room_scan(2));
-    const RegistrationResult result = align(cpu(), PointCloudView(source), PointCloudView(target));
+    const RegistrationResult result =
+        align(cpu(), PointCloudView(source), PointCloudView(target), RegistrationOptions{0.05f});
     ASSERT_TRUE(result.aligned()) << to_string(result.source_viewpoint) << " "
                                   << to_string(result.target_viewpoint) << " " << result.confidence;
     EXPECT_LT(test::rotation_error_degrees(b * a.inverse(), result.target_from_source), 1);

@@ -10,6 +10,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/registration.hpp"
 #include "support/expect_error.hpp"
+#include "support/result_bytes.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg {
@@ -74,6 +75,23 @@ TEST(VoxelSize, LeavesThousandsOfPoints) {
     EXPECT_LE(left, 20000u) << "cloud " << k << ", voxels of " << s.voxel_size;
     EXPECT_NEAR(static_cast<double>(s.points), left, 0.25 * left) << "cloud " << k;
   }
+}
+
+TEST(VoxelSize, TwoCloudsWithoutOptionsAreAlignedBySuggestedVoxels) {
+  Points source = room(1), target = room(1);
+  for (Eigen::Vector3f& p : source) p *= 100;  // centimetres
+  for (Eigen::Vector3f& p : target) p = 100 * p + Eigen::Vector3f(30, 0, 0);
+  const PointCloudView a(source), b(target);
+  const float size = suggest({source, target}).voxel_size;
+  const RegistrationResult chosen = align(Context::cpu(2), a, b);
+  EXPECT_EQ(chosen.voxel_size, size);
+  EXPECT_TRUE(chosen.aligned());
+  EXPECT_EQ(test::bytes(chosen),
+            test::bytes(align(Context::cpu(2), a, b, RegistrationOptions{size})));
+  const Points one_place(5, Eigen::Vector3f(1, 2, 3));
+  const PointCloudView nothing(one_place);
+  EXPECT_EQ(align(Context::cpu(2), nothing, nothing).reason,
+            RegistrationReason::too_few_source_points);
 }
 
 // Voxels smaller than the gaps between the rings leave neighbours on one ring, without normals.

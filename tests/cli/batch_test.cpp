@@ -73,18 +73,25 @@ TEST_F(Batch, WhatIsFixedToTheSensorIsLeftOutAndNamed) {
 
 TEST_F(Batch, VoxelSizeByTheFragments) {
   const std::vector<std::string> words = {
-      "batch", scans_.path(), "-o", out_ / "r.log", "--json", out_ / "r.json", "--backend",
-      "cpu",   "--quality",   "0",  "--voxel-size", "auto"};
+      "batch",  scans_.path(),   "-o",        out_ / "r.log", "--info",    out_ / "r.info",
+      "--json", out_ / "r.json", "--backend", "cpu",          "--quality", "0"};
   const Outcome outcome = run(words);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  expect_holds(outcome.out, {"voxel size 0."});
+  expect_holds(outcome.out, {"voxel size 0.", ", chosen from the clouds"});
   const auto json = json_of(out_ / "r.json");
   EXPECT_NE(json["options"]["voxel_size"], 0.05);
   EXPECT_GE(json["fragments"][0]["points"], 3000);
   EXPECT_LE(json["fragments"][0]["points"], 20000);
   const TemporaryFolder empty;
-  expect_refused({"batch", empty.path(), "-o", out_ / "e.log", "--voxel-size", "auto"},
-                 {empty.path()});
+  expect_refused({"batch", empty.path(), "-o", out_ / "e.log"}, {empty.path()});
+}
+
+TEST_F(Batch, AMapOfItsResultsTakesTheirVoxelSize) {
+  ASSERT_EQ(batch("coarse").status, 0);
+  const Outcome map = run({"reconstruct", scans_.path(), "--results", out_ / "coarse.json", "-o",
+                           out_ / "map", "--no-map", "--no-refine", "--backend", "cpu"});
+  ASSERT_EQ(map.status, 0) << map.err;
+  expect_holds(map.out, {"voxel size 0.1\n"});
 }
 
 TEST_F(Batch, JsonHasEveryFieldOfEveryPair) {

@@ -135,9 +135,9 @@ TEST_F(Register, MapCoordinatesCostNothing) {
 
 TEST_F(Register, VoxelSizeByTheClouds) {
   const std::string path = folder_ / "auto.json";
-  const Outcome outcome = run(
-      {"register", source_, target_, "--backend", "cpu", "--voxel-size", "auto", "--json", path});
+  const Outcome outcome = run({"register", source_, target_, "--backend", "cpu", "--json", path});
   EXPECT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"voxels   0.", ", chosen from the clouds"});
   const auto json = json_of(path);
   EXPECT_NE(json["options"]["voxel_size"], 0.05);  // some 15,000 points in a small room
   for (const char* cloud : {"source", "target"}) {
@@ -147,6 +147,9 @@ TEST_F(Register, VoxelSizeByTheClouds) {
   PointCloud one_place;
   one_place.points.assign(5, {1, 2, 3});
   const std::string bad = write_cloud(folder_, "one_place.ply", one_place);
+  const Outcome nothing = run({"register", bad, bad, "--backend", "cpu"});
+  EXPECT_EQ(nothing.status, 1) << nothing.err;
+  expect_holds(nothing.out, {"too_few_source_points"});
   expect_refused({"register", bad, bad, "--voxel-size", "auto"},
                  {"--voxel-size auto", bad, "one place"});
   expect_refused({"register", source_, target_, "--voxel-size", "automatic"},

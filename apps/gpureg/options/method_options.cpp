@@ -45,9 +45,9 @@ void MethodOptions::add_to(Verb verb) {
             if (text.empty()) voxel_size = 0;  // refused by name, later
             return text.empty() || automatic_voxel_size || read_number(text, voxel_size);
           },
-          "Edge of the downsampling voxel in the unit of the clouds (the default is for rooms in "
-          "metres); every other length follows from it. auto: suggested by the clouds")
-      .show_default(significant(static_cast<double>(voxel_size), 6))
+          "Edge of the downsampling voxel in the unit of the clouds, 0.05 for rooms in metres; "
+          "every other length follows from it. auto: suggested by the clouds")
+      .show_default("auto")
       .type_name("FLOAT or auto");
   verb.option("--preset", preset,
               "default: poses from compatible matches, verified by evidence; loopsmart: the "
@@ -118,9 +118,7 @@ bool MethodOptions::sets_confidence() const {
 RegistrationOptions MethodOptions::registration() const {
   if (preset == "loopsmart" && given("--quality"))
     throw InvalidArgument("--quality does nothing with --preset loopsmart");
-  set_voxel_size_origin(automatic_voxel_size    ? VoxelSizeOrigin::automatic
-                        : given("--voxel-size") ? VoxelSizeOrigin::given
-                                                : VoxelSizeOrigin::standard);
+  set_voxel_size_origin(automatic_voxel_size ? VoxelSizeOrigin::automatic : VoxelSizeOrigin::given);
   RegistrationOptions options = preset == "loopsmart" ? RegistrationOptions::loopsmart(voxel_size)
                                                       : RegistrationOptions{voxel_size, quality};
   options.seed = seed;
@@ -146,18 +144,16 @@ void MethodOptions::choose_voxel_size(const std::vector<PointCloudView>& clouds,
                                       const std::string& what) {
   if (!automatic_voxel_size) return;
   const VoxelSizeSuggestion suggestion = suggest_voxel_size(clouds);
-  if (!suggestion.valid())
+  if (suggestion.valid())
+    voxel_size = suggestion.voxel_size;
+  else if (given("--voxel-size"))
     throw InvalidArgument("--voxel-size auto: " + what + ": " + explain(suggestion.reason));
-  voxel_size = suggestion.voxel_size;
 }
 
 void MethodOptions::choose_voxel_size(const ScanInput& input, const std::string& journal) {
   if (!automatic_voxel_size) return;
   const std::string of_run = PairJournal::setting(journal, "options.voxel_size");
-  if (!of_run.empty()) {
-    voxel_size = std::strtof(of_run.c_str(), nullptr);
-    return;
-  }
+  if (!of_run.empty()) return take_voxel_size(std::strtof(of_run.c_str(), nullptr));
   constexpr std::size_t kMost = 8;
   const std::vector<io::ScanFile> scans = input.list(true);
   const std::size_t count = std::min(scans.size(), kMost);
@@ -174,18 +170,11 @@ void MethodOptions::choose_voxel_size(const ScanInput& input, const std::string&
 void MethodOptions::check_sizes(float used, const PreparedSizes& sizes, bool quiet) const {
   check_voxel_size(used, sizes.extent, "the largest fragment");
   if (automatic_voxel_size && !quiet) note_few_points(sizes.points);
-  if (!given("--voxel-size") && !quiet) note_unusual_points(voxel_size, sizes.points);
 }
 
-std::string MethodOptions::suggestion_text(const std::vector<PointCloudView>& clouds) const {
-  if (given("--voxel-size")) return "";
-  constexpr double kFar = 4;
-  const VoxelSizeSuggestion suggestion = suggest_voxel_size(clouds);
-  const double suggested = static_cast<double>(suggestion.voxel_size);
-  const double used = static_cast<double>(voxel_size);
-  if (!suggestion.valid() || (suggested < kFar * used && used < kFar * suggested)) return "";
-  return "the default of --voxel-size, " + significant(used, 3) +
-         ", may not suit these clouds: auto would be " + significant(suggested, 3);
+std::string MethodOptions::voxel_size_text() const {
+  return significant(static_cast<double>(voxel_size), 3) +
+         (automatic_voxel_size ? ", chosen from the clouds" : "");
 }
 
 Context MethodOptions::context() const {

@@ -17,7 +17,7 @@ namespace gpureg::cli {
 /// The options that `register` and `batch` have in common.
 struct MethodOptions {
   float voxel_size = RegistrationOptions{}.voxel_size;
-  bool automatic_voxel_size = false;  ///< to be chosen by the clouds, see choose_voxel_size
+  bool automatic_voxel_size = true;  ///< to be chosen by the clouds, see choose_voxel_size
   std::string preset = "default";
   std::string backend = "auto";
   unsigned threads = 0;
@@ -46,17 +46,23 @@ struct MethodOptions {
   /// Says on stderr where the calibration was made with another voxel size, once that is chosen.
   void note_calibration() const;
 
-  /// Sets an automatic voxel size to the suggestion of the clouds. what: for the message. Throws
-  /// InvalidArgument without a suggestion.
+  /// Sets an automatic voxel size to the suggestion of the clouds. what: for the message. Without a
+  /// suggestion there is nothing to align, in voxels of any size; who asked for it hears why, by an
+  /// InvalidArgument.
   void choose_voxel_size(const std::vector<PointCloudView>& clouds, const std::string& what);
 
-  /// Where no size was given, and --voxel-size auto would be far from the default: a sentence that
-  /// says so; empty otherwise.
-  std::string suggestion_text(const std::vector<PointCloudView>& clouds) const;
-
-  /// The same by some scans of a folder, evenly chosen; the size of a run that is resumed if it has
-  /// a journal, which says it.
+  /// The same by some scans of a folder, evenly chosen; the size of an earlier run if it has a
+  /// journal, which says it.
   void choose_voxel_size(const ScanInput& input, const std::string& journal = "");
+
+  /// Sets the voxel size of what there is already, as of a map.
+  void take_voxel_size(float size) {
+    voxel_size = size;
+    automatic_voxel_size = false;
+  }
+
+  /// The voxel size for people: "0.05", "0.05, chosen from the clouds".
+  std::string voxel_size_text() const;
 
   /// Says on stderr what fragments, prepared by this voxel size, show about it, unless quiet.
   /// @throws InvalidArgument where it is larger than the largest fragment.

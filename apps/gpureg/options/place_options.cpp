@@ -72,8 +72,6 @@ void choose_automatic(MethodOptions& method, const MapInput& input,
                            scans.empty() ? input.path : scans.front());
   if (const VoxelSizeSuggestion map = suggest_voxel_size(views_of(of_map)); map.valid())
     method.voxel_size = std::max(method.voxel_size, static_cast<float>(map.spacing));
-  std::cerr << "gpureg: note: --voxel-size auto is "
-            << significant(static_cast<double>(method.voxel_size), 3) << std::endl;
 }
 
 }  // namespace
@@ -82,9 +80,6 @@ void choose_voxel_size(MethodOptions& method, const MapInput& input,
                        const std::vector<std::string>& scans) {
   if (!input.saved) {
     if (method.automatic_voxel_size) choose_automatic(method, input, scans);
-    if (method.given("--voxel-size") || scans.empty()) return;
-    const std::string note = method.suggestion_text(views_of(sample_of(scans.front())));
-    if (!note.empty()) std::cerr << "gpureg: note: " << note << std::endl;
     return;
   }
   const float of_map = input.saved->options().voxel_size;
@@ -95,7 +90,7 @@ void choose_voxel_size(MethodOptions& method, const MapInput& input,
     if (assignment.rfind("prepare.", 0) == 0)
       throw InvalidArgument("--set " + assignment + " does nothing in " + input.path +
                             ": a saved map is prepared, and scans as it was");
-  method.voxel_size = of_map;
+  method.take_voxel_size(of_map);
 }
 
 localization::LocateOptions locate_options(const MethodOptions& method) {

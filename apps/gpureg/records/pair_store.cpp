@@ -24,6 +24,11 @@ void check_voxel_size_of(float voxel_size, const std::string& path, float expect
                           significant(static_cast<double>(voxel_size), 4));
 }
 
+float voxel_size_in(const Json& document) {
+  const Json::json_pointer place("/options/voxel_size");
+  return document.contains(place) && document[place].is_number() ? document[place].get<float>() : 0;
+}
+
 std::uint32_t index_of_name(const FragmentFolder& folder, const std::string& name) {
   for (std::size_t k = 0; k < folder.scans.size(); ++k)
     if (folder.scans[k].name == name) return static_cast<std::uint32_t>(k);
@@ -103,14 +108,20 @@ StoredPairs read_pairs(const std::string& path, const FragmentFolder& folder, fl
     out.results.push_back(stored_result(json));
   });
   if (document.contains("loop_consistency"))
-    throw IoError(path +
-                  ": its scores are those of `gpureg consistency`; give the JSON of the batch");
+    throw IoError(
+        path + ": its confidences are those of `gpureg consistency`; give the JSON of the batch");
   if (document.contains("complete") && document["complete"] == false)
     throw IoError(path + ": is of an unfinished batch");
-  const Json::json_pointer place("/options/voxel_size");
-  if (document.contains(place) && document[place].is_number())
-    check_voxel_size_of(document[place].get<float>(), path, voxel_size);
+  if (const float of_pairs = voxel_size_in(document); of_pairs > 0)
+    check_voxel_size_of(of_pairs, path, voxel_size);
   return out;
+}
+
+float voxel_size_of_pairs(const std::string& path) {
+  if (is_journal(path))
+    return std::strtof(PairJournal::setting(path, "options.voxel_size").c_str(), nullptr);
+  DocumentFile file(path);
+  return file.begins_object() ? voxel_size_in(file.read("pairs", [](Json&&) {})) : 0;
 }
 
 }  // namespace gpureg::cli

@@ -33,4 +33,7 @@ struct StoredPairs {
 /// @throws InvalidArgument where it was made with another voxel size.
 StoredPairs read_pairs(const std::string& path, const FragmentFolder& folder, float voxel_size);
 
+/// The voxel size that the pairs of such a file were made with; 0: it does not say.
+float voxel_size_of_pairs(const std::string& path);
+
 }  // namespace gpureg::cli

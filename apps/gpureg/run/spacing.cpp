@@ -104,19 +104,4 @@ void note_few_points(const std::vector<std::pair<std::string, std::size_t>>& pre
             << ": too few for a reliable result, a larger part of the place has more" << std::endl;
 }
 
-void note_unusual_points(float voxel_size,
-                         const std::vector<std::pair<std::string, std::size_t>>& prepared) {
-  constexpr std::size_t kFewest = 1000, kMost = 30'000;
-  if (prepared.empty()) return;
-  std::vector<std::size_t> points;
-  for (const auto& cloud : prepared) points.push_back(cloud.second);
-  const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
-  std::nth_element(points.begin(), middle, points.end());
-  if (*middle >= kFewest && *middle <= kMost) return;
-  std::cerr << "gpureg: note: the default of --voxel-size, "
-            << significant(static_cast<double>(voxel_size), 3) << ", leaves " << grouped(*middle)
-            << " points of a cloud (median), and 3,000 to 20,000 are usual: "
-            << "--voxel-size auto" << std::endl;
-}
-
 }  // namespace gpureg::cli

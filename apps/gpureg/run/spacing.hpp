@@ -32,8 +32,4 @@ void check_voxel_size(float voxel_size, double extent, const std::string& what);
 /// @param prepared file and number of prepared points of each cloud.
 void note_few_points(const std::vector<std::pair<std::string, std::size_t>>& prepared);
 
-/// Says on stderr that the default voxel size leaves most clouds unusually few or many points.
-void note_unusual_points(float voxel_size,
-                         const std::vector<std::pair<std::string, std::size_t>>& prepared);
-
 }  // namespace gpureg::cli

@@ -185,9 +185,7 @@ class Batch {
 
   int summarise() const {
     if (!o_.quiet) {
-      if (o_.method.automatic_voxel_size)
-        std::cout << "voxel size " << significant(static_cast<double>(o_.method.voxel_size), 3)
-                  << "\n";
+      std::cout << "voxel size " << o_.method.voxel_size_text() << "\n";
       std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
                 << fixed(scene_.seconds, 2) << " s\n"
                 << unusable_line(scene_) << "pairs      " << journal_->size() << ", in "

@@ -181,10 +181,8 @@ int run(CalibrateOptions o) {
   if (risk) print_risk(o, *risk);
   const int status = risk && !risk->threshold.supported ? kNoAlignment : kOk;
   if (o.quiet) return status;
-  if (o.method.automatic_voxel_size)
-    std::cout << "voxel size   " << significant(static_cast<double>(o.method.voxel_size), 3)
-              << "\n";
-  std::cout << "fragments    " << clouds.numbers.size() << "\n";
+  std::cout << "voxel size   " << o.method.voxel_size_text() << "\n"
+            << "fragments    " << clouds.numbers.size() << "\n";
   print_count("of one scan  ", result.one_scan);
   print_count("by loops     ", result.loop_consistency);
   print_count("by poses     ", result.trajectory);

@@ -221,8 +221,8 @@ int run(LocateRun o) {
   const std::vector<PointCloud> scans = read_scans(o, context, input.options_or(of_map), options);
   const PreparedMap map = input.prepare(context, of_map);
   std::cout << "map      " << o.map() << ": " << grouped(map.size()) << " points, " << map.tiles()
-            << (map.tiles() == 1 ? " tile\n" : " tiles\n") << "backend  " << context.description()
-            << "\n";
+            << (map.tiles() == 1 ? " tile, voxels of " : " tiles, voxels of ")
+            << o.method.voxel_size_text() << "\nbackend  " << context.description() << "\n";
   if (!o.save_map.empty()) map.save(o.save_map);
   if (o.scans.empty()) return kOk;
   const auto begin = std::chrono::steady_clock::now();

@@ -136,9 +136,7 @@ class Reconstruct {
     if (!write_outputs()) return say_interrupted();
     if (run_.made.journal) ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
     if (!o_.quiet) {
-      if (o_.method.automatic_voxel_size)
-        std::cout << "voxel size " << significant(static_cast<double>(o_.method.voxel_size), 3)
-                  << "\n";
+      std::cout << "voxel size " << o_.method.voxel_size_text() << "\n";
       std::cout << map_summary(run_, context_);
     }
     if (!run_.scene.unusable.empty()) return kIncomplete;
@@ -329,7 +327,11 @@ void add_reconstruct(CommandLine& line) {
     check_pairs(o->input, o->pairs);  // a bad file shall show before the clouds are read
     if (!o->odometry.empty())
       read_odometry(o->odometry, FragmentFolder(o->input, true).scans, o->input.path);
-    o->method.choose_voxel_size(o->input, o->resume.resume ? o->journal() : "");
+    const float of_results = o->results.empty() ? 0 : voxel_size_of_pairs(o->results);
+    if (o->method.automatic_voxel_size && of_results > 0)
+      o->method.take_voxel_size(of_results);
+    else
+      o->method.choose_voxel_size(o->input, o->resume.resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Reconstruct(*o).run();
   });

@@ -132,8 +132,7 @@ void note_pair(const RegisterOptions& o, const PointCloud& source, const PointCl
   // Of a pair that is not aligned, it is what to try.
   const std::string units =
       aligned && !o.scaled ? question_units(source.view(), target.view()) : std::string();
-  for (const std::string& note : {units, o.method.suggestion_text({source.view(), target.view()})})
-    if (!note.empty()) std::cerr << "gpureg: note: " << note << std::endl;
+  if (!units.empty()) std::cerr << "gpureg: note: " << units << std::endl;
   std::error_code ignored;
   if (std::filesystem::equivalent(o.source, o.target, ignored))
     std::cerr << "gpureg: note: SOURCE and TARGET are the same file" << std::endl;
@@ -143,18 +142,16 @@ void note_pair(const RegisterOptions& o, const PointCloud& source, const PointCl
               << std::endl;
 }
 
-/// Calls action(), and asks in its refusal what both clouds suggest: other units, another voxel
-/// size. stderr stays one line.
+/// Calls action(), and asks in its refusal whether the clouds have different units. stderr stays
+/// one line.
 template <typename Action>
-auto asking(const RegisterOptions& o, const PointCloud& source, const PointCloud& target,
-            const Action& action) {
+auto asking(const PointCloud& source, const PointCloud& target, const Action& action) {
   try {
     return action();
   } catch (const InvalidArgument& error) {
     std::string message = error.what();
-    for (const std::string& more : {question_units(source.view(), target.view(), kLeastUnitRatio),
-                                    o.method.suggestion_text({source.view(), target.view()})})
-      if (!more.empty()) message += (message.back() == '?' ? " " : "; ") + more;
+    const std::string units = question_units(source.view(), target.view(), kLeastUnitRatio);
+    if (!units.empty()) message += (message.back() == '?' ? " " : "; ") + units;
     throw InvalidArgument(message);
   }
 }
@@ -194,6 +191,7 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
   const PrepareStatistics &a = source.statistics(), &b = target.statistics();
   std::cout << "source   " << o.source << ": " << describe(a) << "\n"
             << "target   " << o.target << ": " << describe(b) << "\n"
+            << "voxels   " << o.method.voxel_size_text() << "\n"
             << "backend  " << context.description() << "\n"
             << "status   " << to_string(r.status);
   print_reason(o, r);
@@ -226,6 +224,7 @@ void print_verified(const RegisterOptions& o, const Context& context, const Prep
                     const PreparedCloud& target, const RegistrationResult& r) {
   std::cout << "source   " << o.source << ": " << describe(source.statistics()) << "\n"
             << "target   " << o.target << ": " << describe(target.statistics()) << "\n"
+            << "voxels   " << o.method.voxel_size_text() << "\n"
             << "backend  " << context.description() << "\n"
             << "status   " << to_string(r.status);
   print_reason(o, r);
@@ -383,7 +382,7 @@ int run(RegisterOptions o) {
                                                                           : 1.0);
   }
   const auto asking_pair = [&](const auto& action) {
-    return asking(o, source_cloud, target_cloud, action);
+    return asking(source_cloud, target_cloud, action);
   };
   asking_pair([&] {
     check_voxel_size(options.voxel_size, extent_of(source_cloud.points), o.source);

@@ -3,10 +3,12 @@
 #include <pybind11/stl.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 
 #include "cloud.hpp"
 #include "cloud_input.hpp"
+#include "fields.hpp"
 #include "gpureg/error.hpp"
 #include "maps/python_set.hpp"
 
@@ -70,6 +72,13 @@ void bind_journal(py::module_& m) {
       .def("flush", [](Journal& j) { j.get().flush(); })
       .def("close", [](Journal& j) { j.journal.reset(); });
   m.def("read_journal", &contents_of, py::arg("path"));
+  m.def(
+      "voxel_size_of_journal",
+      [](const std::string& path) {
+        const std::string text = PairJournal::setting(path, "options.voxel_size");
+        return shortest(std::strtof(text.c_str(), nullptr));
+      },
+      py::arg("path"), "0: there is no journal.");
   m.def(
       "in_tiles", [](const IndexArray& pairs) { return in_tiles(pairs_of(pairs)); },
       py::arg("pairs"));

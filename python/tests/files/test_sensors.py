@@ -260,7 +260,7 @@ def flat_pose(x, y, turn):
 FIRST, SECOND = (-1.2, 0.8, 0.2), (-0.2, -1.0, 2.6)
 
 
-@pytest.mark.parametrize("voxel_size", [0.1, "auto"])
+@pytest.mark.parametrize("voxel_size", [0.1, None])
 def test_pose_of_flat_scans_is_planar(voxel_size):
     source, target = flat_scan(*FIRST, 1), flat_scan(*SECOND, 2)
     assert gpureg.suggest_voxel_size([source, target]).flat
