@@ -19,7 +19,7 @@ using test::ByteWriter;
 using test::host;
 using test::same_bytes;
 
-struct PairOfClouds {
+struct PairWithPrior {
   std::size_t source, target;
   std::vector<std::uint32_t> custom_source, custom_target;
   PriorTest prior{};
@@ -80,7 +80,7 @@ class EvidenceOnCuda : public ::testing::Test {
   std::mt19937 random{11};
   std::vector<std::vector<Vec3>> kept;
   std::vector<Vec3> viewpoints;
-  std::vector<PairOfClouds> pairs;
+  std::vector<PairWithPrior> pairs;
   RegistrationSettings options = resolve(RegistrationOptions{0.05f});
 };
 
@@ -92,7 +92,7 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   const auto cpu_clouds = pipeline::prepare(on_cpu, span_of(clouds), options.prepare);
   const auto cuda_clouds = pipeline::prepare(on_cuda, span_of(clouds), options.prepare);
   std::vector<PairView> cpu_pairs, cuda_pairs;
-  for (const PairOfClouds& w : pairs) {
+  for (const PairWithPrior& w : pairs) {
     const auto custom = static_cast<std::uint32_t>(w.custom_source.size());
     cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(),
                          w.custom_source.data(), w.custom_target.data(), custom, w.prior});
@@ -342,7 +342,7 @@ TEST_F(EvidenceOnCuda, GivenCorrespondences) {
   all_pairs();
   const auto clouds =
       pipeline::prepare(*std::make_unique<cpu::Exec>(2), span_of(raw()), options.prepare);
-  std::vector<PairOfClouds> custom;
+  std::vector<PairWithPrior> custom;
   for (std::size_t p = 0; p < 12; ++p) {
     custom.push_back(pairs[p]);
     const std::uint32_t n = clouds[pairs[p].source]->size, m = clouds[pairs[p].target]->size;
