@@ -82,8 +82,8 @@ TEST_F(BadCloud, OfManyTheFileIsNamed) {
   const Outcome batch = run({"batch", scans_.path(), "-o", scans_ / "r.log"});
   EXPECT_EQ(batch.status, 3);
   expect_holds(batch.err, {"fragment 3 is left out", bad + ": nearly all of 30000"});
-  expect_refused({"register", good, bad},
-                 {bad + ": nearly all", "are the units different? target is", "auto would be"});
+  expect_refused({"register", good, bad, "--voxel-size", "0.05"},
+                 {bad + ": nearly all", "are the units different? target is"});
 }
 
 }  // namespace

@@ -165,7 +165,7 @@ int audit_and_mend(const AuditVerbOptions& o, const Context& context, AuditRun& 
   return o.mended.empty() ? status_of(run.audit) : mend(o, context, run, options);
 }
 
-int run_audit(const AuditVerbOptions& o) {
+int run_audit(AuditVerbOptions o) {
   const std::vector<NamedPath> inputs = {{"SCANS", o.input.path}, {"POSES", o.poses}};
   std::vector<NamedPath> outputs = {{"--json", o.json}, {"--page", o.page}, {"--mend", o.mended}};
   check_outputs(outputs, inputs);
@@ -174,13 +174,14 @@ int run_audit(const AuditVerbOptions& o) {
   AuditRun run;
   run.input = o.input;
   run.poses_file = o.poses;
-  run.options = o.method.registration();
   // A bad file shall show before the clouds are read.
   run.map = read_map_poses(o.poses, FragmentFolder(o.input, true).scans, o.input.path);
   outputs.pop_back();
   for (const std::string& file : mended_files(o, run.map.islands.size()))
     outputs.push_back({"--mend", file});
   check_outputs(outputs, inputs);
+  o.method.choose_voxel_size(o.input);
+  run.options = o.method.registration();
   run.scene = prepare_folder(context, o.input, run.options, o.quiet);
   if (!run.scene.unusable.empty()) run.map = read_map_poses(o.poses, run.scene.scans, o.input.path);
   for (std::size_t k = 0; k < run.map.scans.size(); ++k)
@@ -218,7 +219,6 @@ void add_audit(CommandLine& line) {
     o->method.refuse({"--min-confidence"}, "in an audit: connections have verdicts of their own");
     if (o->mended.empty())
       o->method.refuse({"--seed", "--quality"}, "without --mend: no pair is aligned");
-    o->method.choose_voxel_size(o->input);
     return run_audit(*o);
   });
 }

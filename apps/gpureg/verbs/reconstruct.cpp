@@ -79,6 +79,16 @@ void check_output_folder(const ReconstructOptions& o) {
   check_outputs(outputs, inputs);
 }
 
+void choose_voxel_size(ReconstructOptions& o) {
+  if (o.method.automatic_voxel_size && !o.results.empty()) {
+    if (const float known = voxel_size_of_pairs(o.results); known > 0)
+      return o.method.take_voxel_size(known);
+    // A bad file shall show before the clouds are read.
+    read_pairs(o.results, FragmentFolder(o.input, true), o.method.voxel_size);
+  }
+  o.method.choose_voxel_size(o.input, o.resume.resume ? o.journal() : "");
+}
+
 /// Progress of each step of the library on stderr.
 class StepProgress {
  public:
@@ -327,11 +337,7 @@ void add_reconstruct(CommandLine& line) {
     check_pairs(o->input, o->pairs);  // a bad file shall show before the clouds are read
     if (!o->odometry.empty())
       read_odometry(o->odometry, FragmentFolder(o->input, true).scans, o->input.path);
-    const float of_results = o->results.empty() ? 0 : voxel_size_of_pairs(o->results);
-    if (o->method.automatic_voxel_size && of_results > 0)
-      o->method.take_voxel_size(of_results);
-    else
-      o->method.choose_voxel_size(o->input, o->resume.resume ? o->journal() : "");
+    choose_voxel_size(*o);
     if (!o->quiet) o->method.note_calibration();
     return Reconstruct(*o).run();
   });
