@@ -133,7 +133,7 @@ py::dict result_state(const RegistrationResult& r) {
   state["confidence"] = r.confidence;
   state["inlier_ratio"] = r.inlier_ratio;
   state["inlier_rmse"] = r.inlier_rmse;
-  state["voxel_size"] = static_cast<double>(r.voxel_size);
+  state["voxel_size"] = shortest(r.voxel_size);
   state["source_moments"] = state_of(r.source_moments);
   state["target_moments"] = state_of(r.target_moments);
   py::list modes;

@@ -407,11 +407,12 @@ def register(
         options = RegistrationOptions()
         if voxel_size is not None:
             options.voxel_size = number_of(voxel_size, "voxel_size")
-        elif suggested := suggest_voxel_size(
+        else:
             # Of a source in another unit nothing follows for the target's.
-            [source, target] if ends is None else [target]
-        ).voxel_size:
-            options.voxel_size = suggested  # else there is nothing to align, in voxels of any size
+            asked = [(source, "source"), (target, "target")][ends is not None :]
+            found = _core.suggest_voxel_size([host_points(cloud, name) for cloud, name in asked])
+            if found.voxel_size > 0:  # else there is nothing to align, in voxels of any size
+                options.voxel_size = found.voxel_size
         if quality is not None:
             options.quality = whole_number_of(quality, "quality", 0)
         if seed is not None:

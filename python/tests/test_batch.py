@@ -554,17 +554,15 @@ def test_sizes_are_checked(tmp_path):
 
 
 def test_the_voxel_size_is_chosen_and_kept(tmp_path):
-    clouds = [moved(room(7, 9000)[k::3], pose(k)) for k in range(3)]
+    clouds = [3 * moved(room(7, 9000)[k::3], pose(k)) for k in range(3)]
     chosen = gpureg.suggest_voxel_size(clouds).voxel_size
     assert chosen != 0.05
     run = gpureg.register_all(clouds, output=tmp_path / "a", progress=False)
     assert run.table()["voxel_size"].to_pylist() == [chosen] * 3
-    wide = gpureg.RegistrationOptions(voxel_size=0.2)
+    wide = gpureg.RegistrationOptions(voxel_size=0.3)
     coarse = gpureg.register_all(clouds, output=tmp_path / "b", options=wide, progress=False)
     again = gpureg.register_all(clouds, output=tmp_path / "b", progress=False)
-    assert (
-        again.resumed == 3 and again.table()["voxel_size"].to_pylist() == [pytest.approx(0.2)] * 3
-    )
+    assert again.resumed == 3 and again.table()["voxel_size"].to_pylist() == [0.3] * 3
     map = gpureg.reconstruct(clouds, results=coarse, refine=False)
-    assert map._options.voxel_size == pytest.approx(0.2)
+    assert map._options.voxel_size == pytest.approx(0.3)
     assert gpureg.audit(clouds, map).verdict

@@ -158,6 +158,6 @@ def test_errors_say_which_cloud(source):
         gpureg.prepare_batch([source, lonely, source])
     for clouds, name in (((lonely, source), "source"), ((source, lonely), "target")):
         with pytest.raises(gpureg.InvalidArgument, match=f"^{name}: {alone}"):
-            gpureg.register(*clouds)
+            gpureg.register(*clouds, voxel_size=0.05)
     with pytest.raises(gpureg.InvalidArgument, match=rf"^fragments\[1\]: {alone}"):
         gpureg.align_batch([source, lonely], [[0, 1]])
