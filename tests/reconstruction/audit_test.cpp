@@ -14,6 +14,7 @@
 #include "reconstruction/audit/edge_confidence.hpp"
 #include "reconstruction/audit/in_units.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
+#include "reconstruction/audit/pair_model.hpp"
 #include "reconstruction/audit/pair_verdicts.hpp"
 #include "support/audited_room.hpp"
 #include "support/registration_result.hpp"
@@ -480,24 +481,47 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
   }
 }
 
-// A floor and a wall fit anywhere along them: the confidence of a right pose is low.
-TEST(Audit, BareSurfacesThatCoincideContradictNothing) {
-  const auto verdict_of = [](float overlap, float any_normal, float weakest) {
-    PoseVerification pose;
-    pose.evidence.information_eigenvalues[0] = weakest;
-    pose.evidence.information_eigenvalues[5] = 1000;
-    pose.confidence = 0.05;
-    pose.evidence.source_overlap = pose.evidence.target_overlap = overlap;
-    pose.evidence.source_overlap_any_normal = pose.evidence.target_overlap_any_normal = any_normal;
-    AuditedPair pair;
-    judge_pair(pose, nullptr, 5000, 0.15, pair);
-    return pair.verdict;
-  };
-  EXPECT_EQ(verdict_of(0.35f, 0.36f, 0.1f), PairVerdict::silent);
-  EXPECT_EQ(verdict_of(0.35f, 0.36f, 10), PairVerdict::contradicts)
-      << "nothing hides a better pose";
-  EXPECT_EQ(verdict_of(0.15f, 0.36f, 0.1f), PairVerdict::contradicts);
-  EXPECT_EQ(verdict_of(0.15f, 0.2f, 10), PairVerdict::silent) << "too little is shared";
+PairVerdict verdict_of(double confidence, float any_normal, float observed, float violation) {
+  PoseVerification pose;
+  pose.confidence = confidence;
+  pose.evidence.source_overlap = pose.evidence.target_overlap = any_normal;
+  pose.evidence.source_overlap_any_normal = pose.evidence.target_overlap_any_normal = any_normal;
+  pose.evidence.source_observed = pose.evidence.target_observed = observed;
+  pose.evidence.source_free_space_violation = violation;
+  AuditedPair pair;
+  judge_pair(pose, nullptr, 0.15, pair);
+  return pair.verdict;
+}
+
+TEST(Audit, FreeSpaceContradictsAndSurfacesSupport) {
+  EXPECT_EQ(verdict_of(0.99, 0.5f, 0.5f, 0.001f), PairVerdict::supports);
+  EXPECT_EQ(verdict_of(0.02, 0.5f, 0.5f, 0.2f), PairVerdict::contradicts);
+  EXPECT_EQ(verdict_of(0, 0, 0.5f, 0.2f), PairVerdict::contradicts);
+}
+
+// A floor and a wall fit anywhere along them: the confidence of a right pose is low. What lies at the
+// other scan's surfaces is then little.
+TEST(Audit, LowConfidenceContradictsByWhatIsShared) {
+  EXPECT_EQ(verdict_of(0.05, 0.05f, 0.5f, 0.001f), PairVerdict::silent);
+  EXPECT_EQ(verdict_of(0.05, 0.5f, 0.5f, 0.001f), PairVerdict::contradicts);
+}
+
+TEST(Audit, ScansThatDoNotSeeEachOtherAreSilent) {
+  EXPECT_EQ(verdict_of(0, 0, 0, 0), PairVerdict::silent);
+}
+
+TEST(Audit, LikelihoodIsMonotone) {
+  const ImpliedPairEvidence worst{0, 1, 1, 1};
+  for (int k = 0; k < 100; ++k) {
+    const double share = k / 100.0, next = (k + 1) / 100.0;
+    EXPECT_LE(log_likelihood_ratio({share, 0.3, 0.05, 0.01}),
+              log_likelihood_ratio({next, 0.3, 0.05, 0.01}));
+    EXPECT_GE(log_likelihood_ratio({0.5, 0.3, share, 0.01}),
+              log_likelihood_ratio({0.5, 0.3, next, 0.01}));
+    EXPECT_GE(log_likelihood_ratio({0.5, 0.3, 0.05, share}),
+              log_likelihood_ratio({0.5, 0.3, 0.05, next}));
+    EXPECT_LE(log_likelihood_ratio(worst), log_likelihood_ratio({share, 1, 1, 1}));
+  }
 }
 
 TEST_F(AuditedRoom, NearPairsAreThoseThatMeet) {

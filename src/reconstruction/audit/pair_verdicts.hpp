@@ -13,11 +13,10 @@ AuditedPair pair_at(const Pair& pair, const std::vector<UnalignedIsometry3d>& wo
 
 /// What the evidence at a pose says.
 /// @param refined where ICP moves the pair; null: it was not asked.
-/// @param points of the smaller cloud.
 /// @param margin by which the map may be off, metres.
 /// @param out scans and pose are given, the rest is filled in.
-void judge_pair(const PoseVerification& given, const PoseVerification* refined, std::size_t points,
-                double margin, AuditedPair& out);
+void judge_pair(const PoseVerification& given, const PoseVerification* refined, double margin,
+                AuditedPair& out);
 
 /// What the scans of each pair say about its pose. ICP moves those that contradict it: what goes
 /// away within the margin of the map is none.
