@@ -19,6 +19,7 @@ using localization::LocateStatus;
 using localization::MapBuilder;
 using localization::MapOptions;
 using localization::PreparedMap;
+using localization::SearchStage;
 
 constexpr float kVoxel = 0.1f;
 
