@@ -499,8 +499,8 @@ TEST(Audit, FreeSpaceContradictsAndSurfacesSupport) {
   EXPECT_EQ(verdict_of(0, 0, 0.5f, 0.2f), PairVerdict::contradicts);
 }
 
-// A floor and a wall fit anywhere along them: the confidence of a right pose is low. What lies at the
-// other scan's surfaces is then little.
+// A floor and a wall fit anywhere along them: the confidence of a right pose is low. What lies at
+// the other scan's surfaces is then little.
 TEST(Audit, LowConfidenceContradictsByWhatIsShared) {
   EXPECT_EQ(verdict_of(0.05, 0.05f, 0.5f, 0.001f), PairVerdict::silent);
   EXPECT_EQ(verdict_of(0.05, 0.5f, 0.5f, 0.001f), PairVerdict::contradicts);

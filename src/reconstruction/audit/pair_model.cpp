@@ -12,14 +12,15 @@ namespace gpureg::reconstruction {
 namespace {
 
 /// The logarithms are of at least these shares: less is noise. Confidences, and their opposites,
-/// count as at least kLeastConfidence.
-constexpr double kLeastConfidence = 1e-4, kLeastViolation = 0.003, kLeastViolating = 0.001;
+/// count as at least kLeastPairConfidence.
+constexpr double kLeastPairConfidence = 1e-4, kLeastViolation = 0.003, kLeastViolating = 0.001;
 /// A low confidence says nothing where hardly a point lies at the other scan's surfaces, and all
 /// that it can where this share does: right poses with less have low confidences, too.
 constexpr double kEnoughShared = 0.25;
 
 std::array<double, kPairFeatures> features_of(const ImpliedPairEvidence& e) {
-  const double confidence = std::clamp(e.confidence, kLeastConfidence, 1 - kLeastConfidence);
+  const double confidence =
+      std::clamp(e.confidence, kLeastPairConfidence, 1 - kLeastPairConfidence);
   const double log_odds = portable::log(confidence / (1 - confidence));
   std::array<double, kPairFeatures> out{};
   const auto set = [&](PairFeature feature, double value) {
