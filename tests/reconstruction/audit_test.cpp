@@ -506,6 +506,26 @@ TEST(Audit, LowConfidenceContradictsByWhatIsShared) {
   EXPECT_EQ(verdict_of(0.05, 0.5f, 0.5f, 0.001f), PairVerdict::contradicts);
 }
 
+// Scans of a LiDAR that are a metre off along a street violate no free space.
+TEST(Audit, ABetterPlaceBeyondTheMarginContradicts) {
+  PoseVerification given, refined;
+  given.target_from_source = refined.target_from_source = UnalignedIsometry3d::Identity();
+  for (PoseVerification* pose : {&given, &refined})
+    pose->evidence.source_overlap_any_normal = pose->evidence.source_observed = 0.6f;
+  given.confidence = 0.6;
+  given.evidence.source_free_space_violation = 0.01f;
+  refined.confidence = 0.97;
+  refined.source_moments.count = 100;
+  const auto verdict_at = [&](double shift) {
+    refined.target_from_source.translation().x() = shift;
+    AuditedPair pair;
+    judge_pair(given, &refined, 0.3, pair);
+    return pair.verdict;
+  };
+  EXPECT_EQ(verdict_at(0.2), PairVerdict::supports);
+  EXPECT_EQ(verdict_at(1), PairVerdict::contradicts);
+}
+
 TEST(Audit, ScansThatDoNotSeeEachOtherAreSilent) {
   EXPECT_EQ(verdict_of(0, 0, 0, 0), PairVerdict::silent);
 }

@@ -45,7 +45,7 @@ struct AuditOptions {
 enum class PairVerdict {
   silent,      ///< they hardly overlap, and neither stands in the other's view
   supports,    ///< their surfaces coincide
-  contradicts  ///< one stands in the other's free space, or they fit better elsewhere
+  contradicts  ///< one stands in the other's free space, or they coincide better elsewhere
 };
 const char* to_string(PairVerdict verdict);
 

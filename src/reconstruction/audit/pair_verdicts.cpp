@@ -130,12 +130,15 @@ void judge_pair(const PoseVerification& given, const PoseVerification* refined, 
   out.overlap = overlap_of(given.evidence);
   out.observed = std::max(given.evidence.source_observed, given.evidence.target_observed);
   ImpliedPairEvidence evidence = evidence_of(given);
+  double rival = 0;
   keep(refined != nullptr ? *refined : given, out);
   if (refined != nullptr) {
     out.shift = shift_of(out);
-    if (out.shift <= margin) {
+    const ImpliedPairEvidence after = evidence_of(*refined);
+    if (out.shift > margin) {
+      rival = log_likelihood_ratio(after);
+    } else {
       // What goes away within the margin of the map is no contradiction.
-      const ImpliedPairEvidence after = evidence_of(*refined);
       evidence.confidence = std::max(evidence.confidence, after.confidence);
       if (after.violation < evidence.violation) {
         evidence.violation = after.violation;
@@ -144,7 +147,9 @@ void judge_pair(const PoseVerification& given, const PoseVerification* refined, 
     }
   }
   out.violation = evidence.violation;
-  const double ratio = log_likelihood_ratio(evidence);
+  double ratio = log_likelihood_ratio(evidence);
+  // Of two places that are further apart than the map may be off, at most one is right.
+  if (rival > kSilent) ratio -= rival;
   if (std::abs(ratio) < kSilent) return;
   out.log_likelihood_ratio = ratio;
   out.verdict = ratio > 0 ? PairVerdict::supports : PairVerdict::contradicts;
