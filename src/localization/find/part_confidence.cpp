@@ -41,8 +41,6 @@ double part_log_odds(const PartEvidence& evidence) {
   return sum;
 }
 
-double part_confidence(const PartEvidence& evidence) {
-  return 1 / (1 + portable::exp(-part_log_odds(evidence)));
-}
+double part_confidence(double log_odds) { return 1 / (1 + portable::exp(-log_odds)); }
 
 }  // namespace gpureg::localization
