@@ -232,7 +232,7 @@ TEST(UnknownViewpoint, GivenCorrespondencesAreTriedWithBothSides) {
     RegistrationPrior same;
     same.correspondences.emplace();
     for (std::uint32_t i = 0; i < source.size(); ++i) same.correspondences->push_back({i, i});
-    const RegistrationResult result = align(cpu(), source, target, {}, same);
+    const RegistrationResult result = align(cpu(), source, target, RegistrationOptions{}, same);
     ASSERT_TRUE(result.aligned()) << result.confidence;
     // Normals of the wrong side would agree nowhere.
     EXPECT_GT(result.modes[0].evidence.source_overlap, 0.9);

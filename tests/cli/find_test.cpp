@@ -209,7 +209,7 @@ TEST(Find, CountsThePosesBelowTheThreshold) {
   ASSERT_EQ(all.size(), 3u);
   const double first = all.at(0).at("confidence"), second = all.at(1).at("confidence");
   ASSERT_GT(first, second);
-  const Outcome found = find(part, scene, {"--min-score", std::to_string((first + second) / 2)});
+  const Outcome found = find(part, scene, {"--min-confidence", std::to_string((first + second) / 2)});
   EXPECT_EQ(found.status, 0);
   expect_holds(found.out, {"found: 1 instance of the part", "doubtful ", "more, up to 0."});
 }
@@ -243,7 +243,7 @@ TEST(Find, RefusesBadInput) {
   expect_refused({"find", part, scene, "--voxel-size", "nan"}, {"voxel"});
   expect_refused({"find", part, scene, "--voxel-size", "0.05"}, {"voxel", "a twentieth"});
   expect_refused({"find", part, scene, "--quality", "11"}, {"--quality"});
-  expect_refused({"find", part, scene, "--min-score", "2"}, {"--min-score"});
+  expect_refused({"find", part, scene, "--min-confidence", "2"}, {"--min-confidence"});
   expect_refused({"find", part, scene, "--viewpoint", "here"}, {"--viewpoint"});
   expect_refused({"find", part, scene, "--json", scene}, {"--json"});
   expect_refused({"find", part, scene, "--image", folder / "no/folder.png"}, {"folder"});

@@ -74,9 +74,9 @@ TEST(Features, ContainmentInModels) {
             static_cast<std::ptrdiff_t>(kFeatureCount - 2));
   const std::vector<PoseEvidence> modes{some_evidence()};
   using V = ViewpointSource;
-  EXPECT_TRUE(available_evidence(modes, V::model, V::said).model);
+  EXPECT_TRUE(available_evidence(modes, V::model, V::given).model);
   EXPECT_TRUE(available_evidence(modes, V::none, V::model).model);
-  EXPECT_FALSE(available_evidence(modes, V::normals, V::said).model);
+  EXPECT_FALSE(available_evidence(modes, V::normals, V::given).model);
 }
 
 // Where free space is known, small front violations rank modes and leave the confidence alone.

@@ -29,10 +29,10 @@ TEST(EvaluateSurfaceCommand, ShiftedPlane) {
                                folder / "truth.ply", "--json", folder / "out.json"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   expect_holds(outcome.out, {"2601, 0 beyond 0.200 m", "tangent planes", "0.0150"});
-  const auto json = json_of(folder / "out.json");
-  EXPECT_NEAR(json.at("metres").at("mean").get<double>(), 0.015, 1e-8);
-  EXPECT_NEAR(json.at("metres").at("median").get<double>(), 0.015, 1e-8);
-  EXPECT_EQ(json.at("points"), 2601);
+  const auto document = json_of(folder / "out.json");
+  EXPECT_NEAR(document.at("metres").at("mean").get<double>(), 0.015, 1e-8);
+  EXPECT_NEAR(document.at("metres").at("median").get<double>(), 0.015, 1e-8);
+  EXPECT_EQ(document.at("points"), 2601);
 }
 
 TEST(EvaluateSurfaceCommand, TrajectoriesAlignTheMap) {

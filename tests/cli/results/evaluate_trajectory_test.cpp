@@ -21,12 +21,12 @@ TEST(EvaluateTrajectoryCommand, KnownAnswer) {
                                "--no-align", "--json", folder / "out.json"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   expect_holds(outcome.out, {"4 matched of 4", "ATE metres", "RPE metres"});
-  const auto json = json_of(folder / "out.json");
+  const auto document = json_of(folder / "out.json");
   // Three poses are 5 m off, one sqrt(25.16) m; sums of squares: 100.16 / 4.
-  EXPECT_NEAR(json.at("ate").at("metres").at("rmse").get<double>(), std::sqrt(25.04), 1e-12);
-  EXPECT_NEAR(json.at("rpe").at("metres").at("max").get<double>(), 0.4, 1e-12);
-  EXPECT_EQ(json.at("poses").at("matched"), 4);
-  EXPECT_FALSE(json.at("options").at("align").get<bool>());
+  EXPECT_NEAR(document.at("ate").at("metres").at("rmse").get<double>(), std::sqrt(25.04), 1e-12);
+  EXPECT_NEAR(document.at("rpe").at("metres").at("max").get<double>(), 0.4, 1e-12);
+  EXPECT_EQ(document.at("poses").at("matched"), 4);
+  EXPECT_FALSE(document.at("options").at("align").get<bool>());
 }
 
 TEST(EvaluateTrajectoryCommand, ErrorsAreNamed) {

@@ -93,13 +93,13 @@ TEST_F(Report, WithTruthAndPictures) {
 }
 
 TEST_F(Report, MissedPairsAndPicturesWithoutTruth) {
-  auto json = json_of(result_);
-  for (auto& pair : json["pairs"])
+  auto document = json_of(result_);
+  for (auto& pair : document["pairs"])
     if (pair["i"] == 0 && pair["j"] == 2) {
       pair["status"] = "not_aligned";
       pair["reason"] = "confidence_too_low";
     }
-  out_.write("r.json", json.dump());
+  out_.write("r.json", document.dump());
   const std::vector<std::string> clouds = {"--clouds", scans_.path()};
   const auto result = page(joined(clouds, {"--ground-truth", scans_.path()})).at(0);
   const auto& missed = result.at("pictures").back();
@@ -114,11 +114,11 @@ TEST_F(Report, MissedPairsAndPicturesWithoutTruth) {
 
 // The script sets texts, never HTML; the data cannot end its element.
 TEST_F(Report, TextsAreEscaped) {
-  auto json = json_of(result_);
-  json["folder"] = "a<b>&\"c\"";
-  json["pairs"][0]["status"] = "not_aligned";
-  json["pairs"][0]["reason"] = "</script><b>bold";
-  out_.write("r.json", json.dump());
+  auto document = json_of(result_);
+  document["folder"] = "a<b>&\"c\"";
+  document["pairs"][0]["status"] = "not_aligned";
+  document["pairs"][0]["reason"] = "</script><b>bold";
+  out_.write("r.json", document.dump());
   const auto result = page({}).at(0);
   EXPECT_EQ(result.at("scene"), "a<b>&\"c\"");
   EXPECT_EQ(result.at("pairs").at(0).at("reason"), "</script><b>bold");
@@ -138,9 +138,9 @@ TEST_F(Report, ResultsOfOtherProgramsMayTellLess) {
 }
 
 TEST_F(Report, ComparesSeveralResults) {
-  auto json = json_of(result_);
-  json["pairs"].erase(json["pairs"].begin(), json["pairs"].begin() + 5);
-  const std::string fewer = out_.write("fewer.json", json.dump());
+  auto document = json_of(result_);
+  document["pairs"].erase(document["pairs"].begin(), document["pairs"].begin() + 5);
+  const std::string fewer = out_.write("fewer.json", document.dump());
   const auto results = page({fewer, "--ground-truth", scans_.path(), "--clouds", scans_.path(),
                              "--clouds", "-", "--name", "all <pairs>", "--name", "fewer"});
   ASSERT_EQ(results.size(), 2u);
