@@ -107,7 +107,7 @@ TEST(Ranked, GeometricPrecisionForgivesWhatRecallDoesNotCount) {
 }
 
 TEST(Ranked, NaNCannotBeRanked) {
-  test::expect_error<InvalidArgument>([] { rank(1, {{std::nan(""), true}}); }, {"score", "nan"});
+  test::expect_error<InvalidArgument>([] { rank(1, {{std::nan(""), true}}); }, {"confidence", "nan"});
   EXPECT_EQ(rank(1, {{INFINITY, true}}).raw_recall, 1);
 }
 
