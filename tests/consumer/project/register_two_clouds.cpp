@@ -7,8 +7,7 @@ int main(int argc, char** argv) {
   if (argc != 3) return 2;
   const auto source = gpureg::io::read_point_cloud(argv[1]);
   const auto target = gpureg::io::read_point_cloud(argv[2]);
-  const gpureg::RegistrationOptions options{0.05f};  // voxel size, metres
-  const auto result = gpureg::align(gpureg::Context::best(), source.view(), target.view(), options);
+  const auto result = gpureg::align(gpureg::Context::best(), source.view(), target.view());
   std::cout << explain(result.reason) << "\n" << result.target_from_source.matrix() << "\n";
   return result.aligned() ? 0 : 1;
 }
