@@ -419,7 +419,7 @@ class TestCommand:
         self.compare(
             kitchen,
             tmp_path,
-            ["--quality", 0],
+            ["--quality", 0, "--voxel-size", 0.05],
             gpureg.RegistrationOptions(voxel_size=0.05, quality=0),
         )
 

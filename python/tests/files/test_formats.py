@@ -126,7 +126,7 @@ class TestE57:
         path, _ = project
         done = run("register", f"{path}#1", f"{path}#2", "--voxel-size", 0.1)
         assert done.returncode == 0, done.stderr
-        assert "viewpoint said" in done.stdout
+        assert "viewpoint given" in done.stdout
         poses = [scan.file_from_scan for scan in gpureg.scans_in(path)]
         rows = done.stdout.split("target_from_source\n")[1].split("\n")[:4]
         found = np.array([[float(number) for number in row.split()] for row in rows])
