@@ -3,9 +3,7 @@
 
 #include <pybind11/stl.h>
 
-#include <array>
 #include <cstdio>
-#include <optional>
 
 #include "cloud_input.hpp"
 #include "fields.hpp"
@@ -49,26 +47,13 @@ void bind_find(py::module_& m) {
       .def_readonly("doubtful", &R::doubtful,
                     "Poses below min_confidence, as far as they deserve a look.")
       .def_property_readonly(
-          "voxel_size", [](const R& r) { return shortest(r.voxel_size); },
-          "Of the search, that was used.")
-      .def_property_readonly(
-          "evidence_voxel_size", [](const R& r) { return shortest(r.evidence_voxel_size); },
-          "Of the evidence: half of it, or more where points are far apart.")
+          "voxel_size", [](const R& r) { return shortest(r.voxel_size); }, "That was used.")
       .def_readonly("diameter", &R::diameter, "Of the part: diagonal of its box.")
       .def_readonly("scene_extent", &R::scene_extent, "Diagonal of the box of the scene.")
       .def_readonly("part_points", &R::part_points, "Prepared points of the part.")
       .def_readonly("scene_points", &R::scene_points, "Prepared points of the scene.")
       .def_readonly("neighborhoods", &R::neighborhoods,
                     "Pieces of the scene that the part was aligned with.")
-      .def_property_readonly(
-          "guessed_viewpoint",
-          [](const R& r) -> std::optional<std::array<double, 3>> {
-            if (!r.viewpoint_guessed) return std::nullopt;
-            const Eigen::Vector3d& v = r.guessed_viewpoint;
-            return std::array<double, 3>{v.x(), v.y(), v.z()};
-          },
-          "From where the scene was seen, where nobody said it and a likely place suits the "
-          "part; else None.")
       .def("__repr__", [](const R& r) {
         char text[96];
         std::snprintf(text, sizeof(text), "<gpureg.FindResult %s, %zu instances>",

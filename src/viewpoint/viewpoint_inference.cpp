@@ -225,21 +225,6 @@ InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud
   return out;
 }
 
-std::vector<Vec3> likely_viewpoints(const SurfaceGraph& graph, const Vec3* origin) {
-  const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
-  if (origin && graph.contradiction(*origin) <= best.as_good()) return {*origin};
-  std::vector<Vec3> out{best.place};
-  const SurfaceGraph::Signs sides = graph.signs_towards(best.place);
-  const SearchedViewpoint::Tried* other = nullptr;
-  for (const SearchedViewpoint::Tried& tried : best.tried)
-    if (tried.contradiction <= best.as_good() &&
-        (!other || tried.contradiction < other->contradiction) &&
-        opposite(graph, sides, tried.place))
-      other = &tried;
-  if (other) out.push_back(other->place);
-  return out;
-}
-
 InferredSides check_given_sides(const SurfaceGraph& graph, bool may_be_model) {
   InferredSides out{ViewpointSource::normals, {}, true};
   const SurfaceGraph::Signs given(graph.points().size(), 1);

@@ -26,12 +26,6 @@ struct InferredSides {
 InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud& rows,
                           Vec3 origin_of_rows, const SpacingSpread* spread, bool may_be_model);
 
-/// Places from which a scan may have been taken: the origin of its frame, where it explains the
-/// surfaces; else the place with the fewest contradictions, and the best of those on the other side
-/// of the surfaces, where one explains them as well.
-/// @param origin null: known not to be a viewpoint.
-std::vector<Vec3> likely_viewpoints(const SurfaceGraph& graph, const Vec3* origin);
-
 /// True where the rows are spaced as a scanner at the origin spaces them: no surface has to tell.
 bool is_scanner(const SpacingSpread& spread);
 

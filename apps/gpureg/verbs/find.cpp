@@ -60,16 +60,10 @@ Json document(const FindRun& o, const Context& context, const FindResult& result
           {"status", localization::to_string(result.status)},
           {"explanation", explain(result)},
           {"voxel_size", result.voxel_size},
-          {"evidence_voxel_size", result.evidence_voxel_size},
           {"diameter", result.diameter},
           {"scene_extent", result.scene_extent},
           {"points", {{"part", result.part_points}, {"scene", result.scene_points}}},
           {"neighborhoods", result.neighborhoods},
-          {"guessed_viewpoint", result.viewpoint_guessed
-                                    ? Json(std::array<double, 3>{result.guessed_viewpoint.x(),
-                                                                 result.guessed_viewpoint.y(),
-                                                                 result.guessed_viewpoint.z()})
-                                    : Json()},
           {"instances", poses_of(result.instances)},
           {"doubtful", poses_of(result.doubtful)},
           {"seconds", seconds}};
@@ -97,11 +91,10 @@ Image picture(const PointCloud& part, const PointCloud& scene, const FindResult&
 void print(const FindRun& o, const Context& context, const FindResult& result) {
   std::cout << "part     " << o.part << ": " << grouped(result.part_points) << " points, diameter "
             << significant(result.diameter, 3) << "\n"
-            << "scene    " << o.scene << ": " << grouped(result.scene_points) << " points";
-  if (result.neighborhoods > 0)
-    std::cout << ", voxels of " << significant(static_cast<double>(result.voxel_size), 3) << ", "
-              << grouped(result.neighborhoods) << " neighbourhoods";
-  std::cout << "\nbackend  " << context.description() << "\n"
+            << "scene    " << o.scene << ": " << grouped(result.scene_points)
+            << " points, voxels of " << significant(static_cast<double>(result.voxel_size), 3)
+            << ", " << grouped(result.neighborhoods) << " neighbourhoods\n"
+            << "backend  " << context.description() << "\n"
             << "status   " << localization::to_string(result.status) << ": " << explain(result)
             << "\n";
   const auto print_pose = [](const char* what, std::size_t number, const FoundPart& part) {
@@ -114,13 +107,8 @@ void print(const FindRun& o, const Context& context, const FindResult& result) {
   };
   for (std::size_t k = 0; k < result.instances.size(); ++k)
     print_pose("instance", k + 1, result.instances[k]);
-  if (result.doubtful.empty()) return;
-  if (result.instances.empty())
+  if (result.instances.empty() && !result.doubtful.empty())
     print_pose("doubtful", 1, result.doubtful.front());
-  else
-    std::cout << "doubtful " << result.doubtful.size()
-              << (result.doubtful.size() == 1 ? " pose" : " poses") << " more, up to "
-              << fixed(result.doubtful.front().confidence, 3) << ": --json has them\n";
 }
 
 int run(const FindRun& o) {
@@ -140,19 +128,6 @@ int run(const FindRun& o) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   print(o, context, result);
-  if (result.viewpoint_guessed) {
-    const Eigen::Vector3d& v = result.guessed_viewpoint;
-    std::cerr << "gpureg: note: " << o.scene << ": it is not known from where it was seen; "
-              << significant(v.x(), 3) << "," << significant(v.y(), 3) << ","
-              << significant(v.z(), 3)
-              << " was guessed, so confidences are lower: --viewpoint x,y,z" << std::endl;
-  }
-  constexpr double kFineOfPart = 0.04;
-  if (result.evidence_voxel_size > kFineOfPart * result.diameter)
-    std::cerr << "gpureg: note: poses are judged in voxels of "
-              << significant(static_cast<double>(result.evidence_voxel_size), 2)
-              << ", which is coarse for this part: a mesh or denser clouds give surer confidences"
-              << std::endl;
   const auto unseen = [](const std::vector<FoundPart>& parts) {
     return !parts.empty() && !parts.front().evidence.viewpoint_known;
   };

@@ -27,9 +27,8 @@ struct FindOptions {
 
 /// Evidence for and against a pose of a part. In view: the surface of the part that the scene's
 /// sensor would see if nothing stood in front of it, by the depth image of the part at the pose.
-/// Without a known viewpoint the likely ones are tried (FindResult::viewpoint_guessed). Where none
-/// suits: its surface seen from the direction that suits the scene best; then nothing is hidden,
-/// violated or a contour.
+/// Without a known viewpoint: its surface seen from the direction that suits the scene best; then
+/// nothing is hidden, violated or a contour.
 struct PartEvidence {
   /// Of the surface in view, the share behind something of the scene.
   double occluded = 0;
@@ -49,7 +48,7 @@ struct PartEvidence {
   /// Support of the best other pose for the same surface that no symmetry of the part explains,
   /// over that of this one; 0: none.
   double rival = 0;
-  bool viewpoint_known = false;  ///< or guessed
+  bool viewpoint_known = false;
 };
 
 /// An instance of a part.
@@ -78,18 +77,11 @@ struct FindResult {
   std::vector<FoundPart> instances;
   /// The same below min_confidence, as far as they deserve a look.
   std::vector<FoundPart> doubtful;
-  float voxel_size = 0;  ///< of the search, that was used
-  /// Of the evidence: half of it, or more where the points of the part or of the scene are far
-  /// apart. Confidences were fitted with a fortieth of the diameter.
-  float evidence_voxel_size = 0;
+  float voxel_size = 0;                           ///< that was used
   double diameter = 0;                            ///< of the part: diagonal of its box
   double scene_extent = 0;                        ///< diagonal of the box of the scene
   std::size_t part_points = 0, scene_points = 0;  ///< prepared
   std::size_t neighborhoods = 0;  ///< pieces of the scene that the part was aligned with
-  /// The scene says nothing of its viewpoint, and a likely one suits the part. Confidences are
-  /// lower than of a known viewpoint.
-  bool viewpoint_guessed = false;
-  Eigen::Vector3d guessed_viewpoint{0, 0, 0};  ///< in the frame of the scene
 };
 
 /// @return one English sentence without full stop for messages.
@@ -102,8 +94,8 @@ std::string explain(const FindResult& result);
 /// threads. Thread-safe.
 /// @param part host memory; a model (PointCloudView::model, as of io::sample_mesh) or a scan.
 /// @param scene host memory, the unit of the part; viewpoints as for prepare().
-/// @throws InvalidArgument as prepare(), for a voxel size that does not suit the part, for a part
-///   whose points are far apart, and for a scene so large that its unit must be another one.
+/// @throws InvalidArgument as prepare(), for a voxel size that does not suit the part, and for a
+///   scene so large that its unit must be another one.
 /// @throws DeviceError if the device fails.
 FindResult find(const Context& context, const PointCloudView& part, const PointCloudView& scene,
                 const FindOptions& options = {});

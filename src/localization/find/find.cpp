@@ -17,7 +17,6 @@
 #include "localization/find/part_confidence.hpp"
 #include "localization/find/search_part.hpp"
 #include "localization/map_state.hpp"
-#include "viewpoint/viewpoint_inference.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -41,20 +40,10 @@ constexpr std::size_t kMostRefined = 400;
 /// Searches of what the likely instances leave, and their log odds.
 constexpr int kRepetitions = 1;
 constexpr double kLikely = 0;
-/// Log odds that a pose loses where the viewpoint was chosen to suit the part: on the side of
-/// caution. Generated bins (8 kinds of parts, 116 poses) need no more than 0.2, but without it 3 of
-/// 10 foreign scenes of other kinds (trays, rooms, depth images) had a confident pose; it was
-/// chosen on those.
-constexpr double kOfGuess = 2.5;
-/// Evidence is not coarser than this share of the diameter because of the part. Of scans of 200
-/// points no instance was found in four scenes, and two of seven scenes had a wrong one.
-constexpr double kCoarsestOfPart = 0.07;
 /// Log odds from which a pose is worth a look.
 constexpr double kDoubtful = -3;
 /// Fewest prepared points of a part and of a scene.
 constexpr std::size_t kFewestPoints = 20;
-/// Neighbours of the surface graph of a scene, in radii of its normals.
-constexpr float kGraphRadius = 1.25f;
 /// A scene whose box is smaller than this share of the part's has no room for it.
 constexpr double kRoom = 0.5;
 
@@ -135,62 +124,13 @@ std::vector<Eigen::Vector3f> thinned(const PointCloudView& scene, float voxel) {
   return out;
 }
 
-/// The surfaces of a scene, and from where they were seen, if that is known.
-struct SeenScene {
-  SearchedScene searched;
-  SceneSurface surface;
-  std::vector<SceneView> views;
-
-  /// @param fine points and normals of the evidence. Those of a scene with a viewpoint and without
-  ///   sides are turned towards it.
-  /// @param raw what the sensor saw.
-  SeenScene(SearchedScene scene, const PreparedCloud& fine, const std::vector<Eigen::Vector3f>& raw,
-            bool part_oriented, float reach)
-      : searched(std::move(scene)),
-        surface(fine.points(), turned(is_oriented(fine), fine.points(), fine.normals()),
-                part_oriented && (is_oriented(fine) || !searched.viewpoints.empty()), reach) {
-    searched.normals = turned(searched.oriented, searched.points, std::move(searched.normals));
-    searched.oriented = searched.oriented || !searched.viewpoints.empty();
-    for (const Eigen::Vector3f& viewpoint : searched.viewpoints) views.emplace_back(raw, viewpoint);
-  }
-
- private:
-  static bool is_oriented(const PreparedCloud& cloud) {
-    return cloud.statistics().viewpoint != ViewpointSource::none;
-  }
-  std::vector<Eigen::Vector3f> turned(bool oriented, const std::vector<Eigen::Vector3f>& points,
-                                      std::vector<Eigen::Vector3f> normals) const {
-    if (oriented || searched.viewpoints.size() != 1) return normals;
-    for (std::size_t k = 0; k < normals.size(); ++k)
-      if (normals[k].dot(searched.viewpoints[0] - points[k]) < 0) normals[k] = -normals[k];
-    return normals;
-  }
-};
-
-/// From where a scene may have been seen that says nothing about it.
-/// @param origin_too the origin of its frame may be such a place.
-std::vector<Eigen::Vector3f> likely_viewpoints_of(const SearchedScene& scene, float normal_radius,
-                                                  bool origin_too, unsigned threads) {
-  std::vector<Vec3> points, normals;
-  for (const Eigen::Vector3f& p : scene.points) points.push_back({p.x(), p.y(), p.z()});
-  for (const Eigen::Vector3f& n : scene.normals) normals.push_back({n.x(), n.y(), n.z()});
-  ThreadGroup group(threads);
-  const SurfaceGraph graph(std::move(points), std::move(normals), kGraphRadius * normal_radius,
-                           group);
-  const Vec3 origin{static_cast<float>(-scene.origin.x()), static_cast<float>(-scene.origin.y()),
-                    static_cast<float>(-scene.origin.z())};
-  std::vector<Eigen::Vector3f> out;
-  for (const Vec3& place : likely_viewpoints(graph, origin_too ? &origin : nullptr))
-    out.emplace_back(place.x, place.y, place.z);
-  return out;
-}
-
 /// What belongs to one part and one scene.
 struct PartSearch {
   const Context& context;
   const PreparedCloud& part;
   const RegistrationSettings& registration;
   const PartVerifier& verifier;
+  const SceneSurface& surface;
   double diameter;
   Eigen::Vector3d part_origin, scene_origin;
   unsigned threads;
@@ -242,13 +182,6 @@ SearchedScene rest_of(const SearchedScene& scene, const SceneSurface& surface,
   return out;
 }
 
-/// @param voxel 0: none was chosen.
-std::string too_few(std::size_t points, float voxel) {
-  return std::to_string(points) + " points" +
-         (voxel > 0 ? " in voxels of " + shown(voxel, 3) : std::string()) + ", at least " +
-         std::to_string(kFewestPoints) + " are needed";
-}
-
 }  // namespace
 
 void FindOptions::validate() const { fields::validate(*this); }
@@ -280,13 +213,14 @@ std::string explain(const FindResult& r) {
       return "no pose of the part is confident; the best one has " +
              shown(r.doubtful.front().confidence, 2);
     case FindStatus::too_few_part_points:
-      return "the part has " + too_few(r.part_points, r.voxel_size);
+      return "the part has " + std::to_string(r.part_points) + " points in voxels of " +
+             shown(r.voxel_size, 3) + ", at least " + std::to_string(kFewestPoints) + " are needed";
     case FindStatus::too_few_scene_points:
-      return "the scene has " + too_few(r.scene_points, r.voxel_size);
+      return "the scene has " + std::to_string(r.scene_points) + " points in voxels of " +
+             shown(r.voxel_size, 3) + ", at least " + std::to_string(kFewestPoints) + " are needed";
     case FindStatus::scene_smaller_than_part:
       return "the scene extends over " + shown(r.scene_extent, 3) + ", the part over " +
-             shown(r.diameter, 3) +
-             ": is the part the first argument, and are both in one unit, as metres?";
+             shown(r.diameter, 3) + ": is the part the first argument, and are both in one unit?";
   }
   return "";
 }
@@ -317,7 +251,7 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
   if (pieces_across * pieces_across > kMostPieces)
     throw InvalidArgument("the scene extends over " + shown(out.scene_extent, 3) +
                           ", the part over " + shown(out.diameter, 3) +
-                          ": are the units different, as metres and millimetres?");
+                          ": are the units different?");
   const double spacing = suggest_voxel_size({scene}).spacing;
   if (out.voxel_size == 0)
     out.voxel_size = static_cast<float>(std::max(out.diameter / kVoxels, kSpacings * spacing));
@@ -327,14 +261,8 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
         shown(out.diameter, 3) + " only: expected a twentieth of it" +
         (options.voxel_size == 0 ? ", and a scene whose points are as close" : ""));
   const double of_part = suggest_voxel_size({outer.view()}).spacing;
-  if (kPartSpacings * of_part > kCoarsestOfPart * out.diameter)
-    throw InvalidArgument("the points of the part are " + shown(of_part, 2) +
-                          " apart, but it extends over " + shown(out.diameter, 3) +
-                          " only: expected a fortieth of it or less, as points of a mesh have");
   const float fine = static_cast<float>(std::max(
       {static_cast<double>(out.voxel_size) / 2, kFineSpacings * spacing, kPartSpacings * of_part}));
-
-  out.evidence_voxel_size = fine;
 
   // The search.
   RegistrationSettings registration = resolve(RegistrationOptions{out.voxel_size, options.quality});
@@ -364,8 +292,16 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
   // The evidence.
   const PartSurface surface = surface_of(context, outer, 0.7f * fine, threads);
   if (surface.points.size() < kFewestPoints) return ended(FindStatus::too_few_part_points);
-  const PreparedCloud fine_scene = prepared_surface(context, scene, fine, true);
+  PointCloudView with_viewpoints = scene;
+  std::vector<float> rows;
+  const PreparedCloud fine_scene = prepared_surface(context, with_viewpoints, fine, true);
+  const bool oriented = fine_scene.statistics().viewpoint != ViewpointSource::none;
+  const SceneSurface scene_surface(fine_scene.points(), fine_scene.normals(),
+                                   oriented && surface.oriented, 2 * fine);
+  std::vector<SceneView> views;
   const std::vector<Eigen::Vector3f> raw = thinned(scene, fine / 2);
+  for (const Eigen::Vector3f& viewpoint : searched.viewpoints) views.emplace_back(raw, viewpoint);
+  const PartVerifier verifier(surface, scene_surface, views, fine);
   // Normals of a model are exact at edges, too.
   const bool exact = !outer.normals.empty();
   std::vector<Vec3> points, normals;
@@ -374,48 +310,16 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
   for (const Eigen::Vector3f& n : exact ? outer.normals : surface.normals)
     normals.push_back({n.x(), n.y(), n.z()});
   CloudSymmetry symmetry(points, normals, 1.5f * fine);
-  const auto seen_from = [&](const std::vector<Eigen::Vector3f>& viewpoints) {
-    SearchedScene from = searched;
-    from.viewpoints = viewpoints;
-    return SeenScene(std::move(from), fine_scene, raw, surface.oriented, 2 * fine);
-  };
-  const auto search_with = [&](const PartVerifier& verifier) {
-    return PartSearch{context,      part_cloud,   registration,    verifier,
-                      out.diameter, outer.origin, searched.origin, threads};
-  };
-  if (searched.viewpoints.empty()) {
-    const SeenScene unseen = seen_from({});
-    const PartVerifier by_surface(surface, unseen.surface, unseen.views, fine);
-    const std::vector<Hypothesis> poses =
-        hypotheses_in(search_with(by_surface), unseen.searched, out.neighborhoods);
-    double most = 0;
-    for (const Eigen::Vector3f& viewpoint : likely_viewpoints_of(
-             searched, registration.prepare.normal_radius, scene.infer_viewpoint, threads)) {
-      const SeenScene seen = seen_from({viewpoint});
-      const PartVerifier verifier(surface, seen.surface, seen.views, fine);
-      std::vector<Hypothesis> here = poses;
-      judge(verifier, threads, here);
-      double sum = 0;
-      for (const Hypothesis& h : instances_of(verifier, symmetry, out.diameter, here))
-        sum += std::max(0.0, h.log_odds);
-      if (sum <= most) continue;
-      most = sum;
-      searched.viewpoints = {viewpoint};
-      out.viewpoint_guessed = true;
-      out.guessed_viewpoint = viewpoint.cast<double>() + searched.origin;
-    }
-  }
-  const SeenScene seen = seen_from(searched.viewpoints);
-  const PartVerifier verifier(surface, seen.surface, seen.views, fine);
-  const PartSearch search = search_with(verifier);
-  std::vector<Hypothesis> all = hypotheses_in(search, seen.searched, out.neighborhoods), instances;
+  const PartSearch search{context,      part_cloud,   registration,    verifier, scene_surface,
+                          out.diameter, outer.origin, searched.origin, threads};
+  std::vector<Hypothesis> all = hypotheses_in(search, searched, out.neighborhoods), instances;
   for (int round = 0;; ++round) {
     instances = instances_of(verifier, symmetry, out.diameter, all);
     if (round == kRepetitions) break;
     // What was found hides nothing of the others any more.
     ++registration.seed;
     for (Hypothesis& h :
-         hypotheses_in(search, rest_of(seen.searched, seen.surface, instances), out.neighborhoods))
+         hypotheses_in(search, rest_of(searched, scene_surface, instances), out.neighborhoods))
       all.push_back(std::move(h));
     all = distinct(verifier, std::move(all), kSameAfterRefinement * out.diameter);
     judge(verifier, threads, all);
@@ -424,9 +328,8 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
     FoundPart instance;
     instance.evidence = h.verdict.evidence;
     instance.equivalent_poses = h.equivalent;
-    const double log_odds =
-        part_log_odds(instance.evidence) - (out.viewpoint_guessed ? kOfGuess : 0);
-    instance.confidence = part_confidence(log_odds);
+    const double log_odds = part_log_odds(instance.evidence);
+    instance.confidence = part_confidence(instance.evidence);
     instance.scene_from_part =
         Eigen::Translation3d(searched.origin) * h.pose * Eigen::Translation3d(-outer.origin);
     if (instance.confidence >= options.min_confidence)

@@ -41,6 +41,8 @@ double part_log_odds(const PartEvidence& evidence) {
   return sum;
 }
 
-double part_confidence(double log_odds) { return 1 / (1 + portable::exp(-log_odds)); }
+double part_confidence(const PartEvidence& evidence) {
+  return 1 / (1 + portable::exp(-part_log_odds(evidence)));
+}
 
 }  // namespace gpureg::localization

@@ -29,6 +29,6 @@ std::array<double, kPartFeatures> part_features(const PartEvidence& evidence);
 
 /// Logarithm of the odds that the pose is correct; monotone in every feature.
 double part_log_odds(const PartEvidence& evidence);
-double part_confidence(double log_odds);
+double part_confidence(const PartEvidence& evidence);
 
 }  // namespace gpureg::localization
