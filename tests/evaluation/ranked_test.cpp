@@ -107,7 +107,8 @@ TEST(Ranked, GeometricPrecisionForgivesWhatRecallDoesNotCount) {
 }
 
 TEST(Ranked, NaNCannotBeRanked) {
-  test::expect_error<InvalidArgument>([] { rank(1, {{std::nan(""), true}}); }, {"confidence", "nan"});
+  test::expect_error<InvalidArgument>([] { rank(1, {{std::nan(""), true}}); },
+                                      {"confidence", "nan"});
   EXPECT_EQ(rank(1, {{INFINITY, true}}).raw_recall, 1);
 }
 
