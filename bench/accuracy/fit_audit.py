@@ -6,8 +6,8 @@ Evidence at correct poses of pairs that are near each other (moved by the error 
 that false joins imply (the most confident false pose of a pair puts the scans around one end beside those
 around the other end), and at poses of slips (correct poses moved by 0.3 to 1 m, turned by 3 to 10
 degrees, or both). An additive model, piecewise linear and monotone, tells them apart; correct and wrong
-have the same weight, and so has every place. `kinds` of the record: the loss (nats) at each place of a
-fit on the others.
+have the same weight, and so has every place. It prints the loss (nats) at each place of a fit on the
+others, and in sample.
 
     fit_audit.py --gather ROWS.json PLACE=SCENE_FOLDER=RESULT.json[=NOISE] ...
     fit_audit.py ROWS.json [--write]    (src/reconstruction/audit/pair_model_table.hpp)
@@ -21,20 +21,23 @@ import argparse
 import itertools
 import json
 import pathlib
+import re
 
 import gpureg
 import numpy as np
 from scipy.optimize import minimize
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-TABLE = ROOT / "src/reconstruction/audit/pair_model_table.hpp"
+AUDIT = pathlib.Path(__file__).resolve().parents[2] / "src/reconstruction/audit"
 VOXEL = 0.05
 TRUE, SLIPS, JOINS, AROUND = 230, 100, 20, 6  # of a scene; scans around each end of a join
 MAP_METRES, MAP_DEGREES = 0.015, 0.3  # error of a good map
 WRONG = 0.35  # metres
-MARGIN, MARGIN_PER_METRE = 0.15, 0.01  # AuditOptions
-LEAST_CONFIDENCE, LEAST_VIOLATION, LEAST_VIOLATING, ENOUGH_SHARED = 1e-4, 0.003, 0.001, 0.25
-LEAST_OBSERVED = 0.04
+# The constants of the features are those of the library.
+CONSTANT = {
+    name: float(value)
+    for file in ("pair_model.cpp", "pair_verdicts.cpp")
+    for name, value in re.findall(r"(k[A-Z]\w+) = ([\d.e-]+)", (AUDIT / file).read_text())
+}
 SHARE_OF = {"true": 0.5, "join": 0.35, "slip": 0.15}
 PENALTY = 0.003
 KNOTS = {
@@ -51,7 +54,7 @@ def worse_side(evidence):
         (getattr(evidence, f"{side}_free_space_violation"), getattr(evidence, f"{side}_observed"))
         for side in ("source", "target")
     ]
-    share, observed = max((s for s in sides if s[1] >= LEAST_OBSERVED), default=(0, 0))
+    share, observed = max((s for s in sides if s[1] >= CONSTANT["kLeastObserved"]), default=(0, 0))
     return share, share * observed
 
 
@@ -74,14 +77,15 @@ def terms(source, target, pose, margin):
 
 def features(rows):
     confidence, shared, violation, violating = np.array(rows).T
-    confidence = np.clip(confidence, LEAST_CONFIDENCE, 1 - LEAST_CONFIDENCE)
+    least = CONSTANT["kLeastPairConfidence"]
+    confidence = np.clip(confidence, least, 1 - least)
     log_odds = np.log(confidence / (1 - confidence))
     return np.stack(
         [
             np.maximum(log_odds, 0),
-            np.minimum(log_odds, 0) * np.minimum(shared / ENOUGH_SHARED, 1),
-            -np.log(np.maximum(violation, LEAST_VIOLATION)),
-            -np.log(np.maximum(violating, LEAST_VIOLATING)),
+            np.minimum(log_odds, 0) * np.minimum(shared / CONSTANT["kEnoughShared"], 1),
+            -np.log(np.maximum(violation, CONSTANT["kLeastViolation"])),
+            -np.log(np.maximum(violating, CONSTANT["kLeastViolating"])),
         ],
         1,
     )
@@ -136,7 +140,9 @@ class Scene:
 
     def ask(self, a, b, pose):
         """@param pose: from the frame of scan b into that of scan a."""
-        margin = MARGIN + MARGIN_PER_METRE * np.linalg.norm(pose[:3, 3])
+        audit = gpureg.AuditOptions()
+        margin = VOXEL * audit.max_shift  # in voxels
+        margin += audit.max_shift_per_metre * np.linalg.norm(pose[:3, 3])
         return terms(self.clouds[b], self.clouds[a], pose, margin)
 
     def near_pairs(self):
@@ -296,7 +302,7 @@ def main():
     p = fit(rows, list(rows))
     print(f"{'in sample':16} {loss_of(rows, list(rows), p):.3f}")
     if arguments.write:
-        write(p, TABLE)
+        write(p, AUDIT / "pair_model_table.hpp")
 
 
 if __name__ == "__main__":

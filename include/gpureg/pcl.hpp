@@ -133,8 +133,7 @@ class PclRegistration : public pcl::Registration<PointSource, PointTarget, float
   const Context& getContext() const { return context_; }
 
   /// @return the full result of the last align(): status and reason, confidence, statistics,
-  /// timings,
-  ///   and the pose in double precision.
+  ///   timings, and the pose in double precision.
   const RegistrationResult& result() const { return result_; }
 
  protected:

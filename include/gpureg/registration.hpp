@@ -56,8 +56,8 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
 /// @param target cloud that stays.
 /// @param options options.prepare is validated but not applied; each cloud keeps what it was
 ///   prepared with.
-/// @return the result; "no alignment" is a status, not an error.
 /// @param prior what is known of the pair; nothing by default.
+/// @return the result; "no alignment" is a status, not an error.
 /// @throws InvalidArgument if a correspondence distance exceeds that of the preparation, if
 ///   the dimensions of the features differ, for clouds of another backend, for a prior out of range
 ///   or with an index out of range, and for a pose or gravity with RegistrationMethod::quadruples.
@@ -66,8 +66,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationOptions& options = {},
                          const RegistrationPrior& prior = {});
 
-/// Prepares both clouds and aligns them. Prepare clouds of several pairs once
-/// instead.
+/// Prepares both clouds and aligns them. Prepare clouds of several pairs once instead.
 /// @throws InvalidArgument as prepare() and align() do.
 RegistrationResult align(const Context& context, const PointCloudView& source,
                          const PointCloudView& target, const RegistrationOptions& options,

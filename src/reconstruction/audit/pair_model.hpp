@@ -3,12 +3,14 @@
 
 namespace gpureg::reconstruction {
 
-/// What two scans say about a pose that a map implies. The worse side counts.
+/// What two scans say about a pose that a map implies.
 struct ImpliedPairEvidence {
   double confidence = 0;  ///< of the pose alone
-  double shared = 0;      ///< share of the points at the other scan's surfaces, any normal
-  double violation = 0;   ///< share in free space of the points in view
-  double violating = 0;   ///< share in free space of all points
+  /// Larger share of the points of one scan at the other's surfaces, any normal.
+  double shared = 0;
+  /// Of the scan that is worse off in free space: share there of its points in view.
+  double violation = 0;
+  double violating = 0;  ///< share there of all its points
 };
 
 /// log(p(evidence, correct pose) / p(evidence, wrong pose)). Monotone in every term: additive and
