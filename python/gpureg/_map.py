@@ -195,10 +195,17 @@ class Map:
 
     @property
     def places_look_alike(self) -> bool:
-        """Whether more confident pairs contradicted the map than their confidences explain. Then
-        only pairs are trusted that keep scans of consecutive numbers beside each other.
+        """Whether pairs contradicted each other as those of equal places do. Then only pairs are
+        trusted that keep scans of consecutive numbers beside each other.
         """
         return self._places_look_alike
+
+    @property
+    def agreement(self) -> tuple[float, float]:
+        """Share of the confidence of all pairs that contradicts the others, and the pairs that agree
+        for each scan; what `places_look_alike` is decided by.
+        """
+        return self._graph.agreement
 
     def points(
         self, island: int = 0, *, voxel_size: float | None = None

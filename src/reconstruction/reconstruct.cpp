@@ -145,9 +145,26 @@ Edge edge_of(const PairGraph& pairs, std::size_t k, const pose_graph::EdgeResult
 struct Round {
   pose_graph::Result result;
   std::vector<Edge> edges;           ///< all
+  Agreement agreement;               ///< before connections are cut
   std::vector<std::uint32_t> parts;  ///< of each scan: the part that accepted edges connect it to
   bool dropped = false;              ///< an edge turned out to be unconfirmed
 };
+
+/// Of the first round, which has all edges.
+Agreement agreement_of(const std::vector<Edge>& edges) {
+  Agreement out;
+  double all = 0, contradicted = 0;
+  std::set<std::uint32_t> scans;
+  for (const Edge& edge : edges) {
+    all += edge.pair_confidence;
+    if (!edge.accepted) contradicted += edge.pair_confidence;
+    out.edges_per_scan += edge.accepted;
+    scans.insert({edge.source, edge.target});
+  }
+  if (all > 0) out.contradicted = contradicted / all;
+  if (!scans.empty()) out.edges_per_scan /= static_cast<double>(scans.size());
+  return out;
+}
 
 /// A rejected edge that is alone between two parts contradicts nothing: it is not confident enough
 /// to connect them.
@@ -192,6 +209,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs,
     if (result.state == pose_graph::EdgeState::rejected) result.mode = 0;
     round.edges[kept[k]] = edge_of(pairs, kept[k], result);
   }
+  round.agreement = agreement_of(round.edges);
   round.parts = certain_parts(scans, round.edges, odometry, options.min_connection_confidence);
   split_at_weak_links(round.edges, odometry, options.min_connection_confidence, round.parts);
   for (std::size_t k = 0; k < round.edges.size(); ++k) {
@@ -299,6 +317,7 @@ Reconstruction reconstruct_from_poses(std::size_t scans, const std::vector<Pair>
 
   std::vector<char> unconfirmed(graph.graph.edges.size(), 0);
   Round round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
+  map.agreement = round.agreement;
   for (int k = 1; round.dropped && k < kMostDrops; ++k)
     round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
 

@@ -91,47 +91,28 @@ TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
   EXPECT_FALSE(set.look_alike());
 }
 
-TEST(Path, FewRejectedPairsOfManySayNothing) {
+/// A map of those shares, without a step of the path.
+bool agreement_looks_alike(double contradicted, double edges_per_scan) {
   Reconstruction map;
-  map.scans.resize(kStations);
-  map.edges.resize(500);
-  const auto look_alike = [&](std::size_t rejected) {
-    for (std::size_t k = 0; k < map.edges.size(); ++k) {
-      map.edges[k].source = 2;  // no step of the path
-      map.edges[k].pair_confidence = 0.99;
-      map.edges[k].accepted = k >= rejected;
-    }
-    return places_look_alike(map, sensors(), {}, {});
-  };
-  EXPECT_FALSE(look_alike(15));  // more than the confidences explain
-  EXPECT_TRUE(look_alike(25));
-}
-
-/// Of 400 pairs of 40 scans so many are rejected, all with a confidence that says little.
-bool rejected_of_400_look_alike(std::size_t rejected) {
-  Reconstruction map;
-  map.scans.resize(kStations);
-  for (Scan& scan : map.scans) scan.placed = true;
-  map.edges.resize(400);
-  for (std::size_t k = 0; k < map.edges.size(); ++k) {
-    map.edges[k].source = 2;  // no step of the path
-    map.edges[k].pair_confidence = 0.6;
-    map.edges[k].accepted = k >= rejected;
-  }
+  map.agreement = {contradicted, edges_per_scan};
   return places_look_alike(map, sensors(), {}, {});
 }
 
-TEST(Path, ManyRejectedPairsOfLittleConfidenceShowAliasesToo) {
-  EXPECT_FALSE(rejected_of_400_look_alike(40));
-  EXPECT_TRUE(rejected_of_400_look_alike(80));
-  // Few are accepted for each scan: nothing confirms the others, nothing contradicts them.
-  EXPECT_FALSE(rejected_of_400_look_alike(330));
+TEST(Path, PairsThatContradictEachOtherShowAliases) {
+  // The more pairs a scan has, the fewer are wrong in the end where places differ.
+  EXPECT_FALSE(agreement_looks_alike(0.01, 5));
+  EXPECT_TRUE(agreement_looks_alike(0.1, 5));
+  EXPECT_FALSE(agreement_looks_alike(0.04, 2));
+  EXPECT_TRUE(agreement_looks_alike(0.3, 2));
+  EXPECT_FALSE(agreement_looks_alike(0.2, 1));
+  EXPECT_FALSE(agreement_looks_alike(0, 9));
 }
 
 /// A map of all scans at two places, as aliases make it, without any rejected pair.
 bool folded_path_looks_alike(const TwinBays& set) {
   Reconstruction map = reconstruct_from_poses(kStations, set.pairs, set.results);
   map.islands.resize(1);
+  map.agreement = {};
   for (Edge& edge : map.edges) edge.accepted = true;
   for (std::uint32_t k = 0; k < kStations; ++k) {
     map.scans[k].placed = true;

@@ -36,6 +36,8 @@ TEST(Reconstruct, RejectsFalsePairs) {
   EXPECT_EQ(map.placed(), 12u);
   EXPECT_LT(largest_error(map, data.world_from_scan, 0), kTolerance);
   for (const auto& edge : map.edges) EXPECT_EQ(edge.accepted, edge.source - edge.target <= 3);
+  EXPECT_NEAR(map.agreement.contradicted, 2 * 0.9 / (30 * 0.95 + 2 * 0.9), 1e-9);
+  EXPECT_DOUBLE_EQ(map.agreement.edges_per_scan, 30.0 / 12);
 }
 
 TEST(Reconstruct, TwoHousesStayTwoIslands) {

@@ -136,9 +136,18 @@ struct Island {
   std::vector<std::uint32_t> scans;
 };
 
+/// How far the pairs of a set agree, before connections that are too weak are cut.
+struct Agreement {
+  /// Of the confidence of all edges, each by its pair alone, the share of edges that contradict the
+  /// others.
+  double contradicted = 0;
+  double edges_per_scan = 0;  ///< edges that agree, for each scan that has an edge
+};
+
 /// A map: a plain value.
 struct Reconstruction {
   pose_graph::Status status = pose_graph::Status::no_nodes;  ///< of the last optimisation
+  Agreement agreement;                                       ///< of the pairs
   std::vector<Scan> scans;                                   ///< in their order
   std::vector<Edge> edges;                                   ///< in the order of the pairs
   std::vector<Island> islands;  ///< the largest first, then by smallest scan

@@ -8,6 +8,7 @@
 
 #include "common/stop_scope.hpp"
 #include "math/trigonometry.hpp"
+#include "reconstruction/audit/alike_model.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -17,16 +18,6 @@ constexpr double kConfident = 0.9;
 /// Modes of a pair that are asked, and the least confidence of one.
 constexpr std::size_t kModes = 4;
 constexpr double kLeastOfMode = 0.1;
-/// Of the confident pairs, at least such a share is rejected where places look alike (0.08 to 0.15
-/// in offices and warehouses). Large right maps of houses reject up to 0.02, more than is
-/// explained.
-constexpr double kLeastRejected = 0.04;
-/// Of the confidence of all pairs, at most this share is that of rejected ones where places differ,
-/// in maps with so many accepted pairs for each scan: 0 to 0.09 in 14 maps of houses, a ward, a
-/// kitchen and a furnished warehouse; 0.06 to 0.55 in 13 of an office, a flat, a bare warehouse,
-/// corridors, racks and garages, nine of them above. Maps of few pairs have more everywhere, as
-/// nothing confirms them.
-constexpr double kMostRejected = 0.15, kManyPairs = 2;
 /// Consecutive scans that are too far apart for one to be a pause of the sensor.
 constexpr std::size_t kSeveral = 2;
 /// A rival at another pose that is as likely as not.
@@ -271,24 +262,13 @@ class Growth {
 bool places_look_alike(const Reconstruction& map, const std::vector<Eigen::Vector3d>& sensors,
                        const std::vector<Pair>& pairs,
                        const std::vector<RegistrationResult>& results) {
-  double confident = 0, expected = 0, rejected = 0, accepted = 0, mass = 0, rejected_mass = 0;
+  if (alike_log_odds(map.agreement) > 0) return true;
   std::vector<double> steps;
   for (const Edge& edge : map.edges) {
-    accepted += edge.accepted;
-    mass += edge.pair_confidence;
-    if (!edge.accepted) rejected_mass += edge.pair_confidence;
-    if (edge.pair_confidence < kConfident) continue;
-    ++confident;
-    expected += 1 - edge.pair_confidence;
-    rejected += !edge.accepted;
     const Pair pair{edge.source, edge.target};
-    if (gap_of(pair) == 1) steps.push_back(step_of(pair, edge.target_from_source, sensors));
+    if (edge.pair_confidence >= kConfident && gap_of(pair) == 1)
+      steps.push_back(step_of(pair, edge.target_from_source, sensors));
   }
-  const bool unexplained = rejected > std::max({1.0, expected, kLeastRejected * confident});
-  if (unexplained && rejected > expected + 2 * std::sqrt(expected) + 1) return true;
-  const auto scans = static_cast<double>(
-      std::count_if(map.scans.begin(), map.scans.end(), [](const Scan& s) { return s.placed; }));
-  if (accepted >= kManyPairs * scans && rejected_mass > kMostRejected * mass) return true;
   if (steps.size() < kLeastSteps) return false;
   const double max_step = kLongestStep * quantile(std::move(steps));
   std::size_t far_apart = 0;
@@ -298,7 +278,6 @@ bool places_look_alike(const Reconstruction& map, const std::vector<Eigen::Vecto
         a.placed && b.placed && a.island == b.island &&
         step_of({k, k - 1}, a.island_from_scan.inverse() * b.island_from_scan, sensors) > max_step;
   }
-  if (unexplained) return far_apart > 0;
   return far_apart >= kSeveral && path_of(sensors, pairs, results).known;
 }
 

@@ -9,12 +9,9 @@
 namespace gpureg::reconstruction {
 
 /// Whether places of this building look alike, so that pairs that agree may be wrong together:
-/// * more confident pairs contradict the map than their confidences explain, by two standard
-///   deviations, or else by any number while scans of consecutive numbers lie farther apart than
-///   others,
-/// * or several consecutive scans lie so far apart, and the numbers are known to follow a path,
-/// * or, in a map with many pairs, too much of the confidence of all pairs is that of rejected
-/// ones.
+/// * more of the confidence of all pairs contradicts the others than in sets of distinct places,
+/// * or several scans of consecutive numbers lie farther apart than others, and the numbers are
+///   known to follow a path.
 /// @param sensors where the sensor of each scan was, in its frame, metres.
 /// @param pairs, results what the map was made of.
 bool places_look_alike(const Reconstruction& map, const std::vector<Eigen::Vector3d>& sensors,

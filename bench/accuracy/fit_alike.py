@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Do places of a set look alike? Log odds by how far its pairs agree (Reconstruction::agreement).
+
+Sets: all scans of a scene, halves, thirds, random two thirds and halves. Places look alike where more than
+a tenth of the poses from a confidence of one half on are wrong. Logistic regression, each kind of place with
+the same weight; it prints the sets that a fit on the other kinds gets wrong.
+
+    fit_alike.py --gather ROWS.json KIND=SCENE_FOLDER ... [--backend cuda]    adds rows
+    fit_alike.py ROWS.json [--write]    (src/reconstruction/audit/alike_model.hpp)
+
+SCENE_FOLDER has cloud_bin_<i>.ply, cameras.txt and poses.txt. Needs the package gpureg, numpy and scipy.
+"""
+
+import argparse
+import collections
+import json
+import pathlib
+import random
+import re
+
+import numpy as np
+from scipy.optimize import minimize
+
+HEADER = pathlib.Path(__file__).resolve().parents[2] / "src/reconstruction/audit/alike_model.hpp"
+VOXEL = 0.05
+WRONG = 0.35, 8  # metres, degrees
+REPORTED, ALIKE = 0.5, 0.1
+PENALTY = 1e-3
+
+
+def subsets(scans):
+    """Names and positions."""
+    yield "all", range(scans)
+    for step in (2, 3):
+        for first in range(step):
+            yield f"every {step} from {first}", range(first, scans, step)
+    for share, count in ((2 / 3, 3), (1 / 2, 3)):
+        for seed in range(count):
+            chosen = random.Random(seed).sample(range(scans), int(scans * share))
+            yield f"{share:.2f}, seed {seed}", sorted(chosen)
+
+
+def is_wrong(pose, truth):
+    e = np.linalg.inv(truth) @ pose
+    turn = np.degrees(np.arccos(np.clip((np.trace(e[:3, :3]) - 1) / 2, -1, 1)))
+    return bool(np.linalg.norm(e[:3, 3]) > WRONG[0] or turn > WRONG[1])
+
+
+def gather(file, places, backend):
+    import gpureg
+    from map_rmse import read_poses
+
+    out = json.loads(file.read_text()) if file.exists() else []
+    context = getattr(gpureg.Context, backend)()
+    options = gpureg.RegistrationOptions(voxel_size=VOXEL)
+    for place in places:
+        kind, folder = place.split("=")
+        folder = pathlib.Path(folder)
+        scene = gpureg.FragmentSet.from_directory(folder)
+        truth, numbers = read_poses(folder / "poses.txt"), scene.numbers
+        rows = [(s, t) for t in range(len(scene)) for s in range(t + 1, len(scene))]
+        with_cameras = [gpureg.read_cameras(folder / "cameras.txt")[n] for n in numbers]
+        clouds = [
+            gpureg.prepare(
+                folder / scene.names[k], viewpoints=cameras, options=options, context=context
+            )
+            for k, cameras in enumerate(with_cameras)
+        ]
+        results = gpureg.align_batch(clouds, rows, options=options, context=context)
+        wrong = [
+            r.has_pose
+            and is_wrong(r.target_from_source, np.linalg.inv(truth[numbers[t]]) @ truth[numbers[s]])
+            for (s, t), r in zip(rows, results)
+        ]
+        for name, kept in subsets(len(scene)):
+            left = set(range(len(scene))) - set(kept)
+            chosen = [k for k, pair in enumerate(rows) if left.isdisjoint(pair)]
+            reported = [k for k in chosen if results[k].confidence >= REPORTED]
+            made = gpureg.reconstruct(
+                scene.without(left) if left else scene,
+                [(numbers[rows[k][0]], numbers[rows[k][1]]) for k in chosen],
+                results=[results[k] for k in chosen],
+                options=options,
+                audit=False,
+                refine=False,
+                context=context,
+            )
+            contradicted, edges_per_scan = made.agreement
+            out.append(
+                {
+                    "kind": kind,
+                    "scene": folder.name,
+                    "subset": name,
+                    "contradicted": round(contradicted, 5),
+                    "edges_per_scan": round(edges_per_scan, 3),
+                    "reported": len(reported),
+                    "wrong": sum(wrong[k] for k in reported),
+                }
+            )
+        print(kind, folder.name, flush=True)
+        file.write_text("[\n" + ",\n".join(map(json.dumps, out)) + "\n]\n")
+
+
+def features(rows):
+    return np.array(
+        [
+            (1, np.log(max(r["contradicted"], 1e-3)), np.log(max(r["edges_per_scan"], 0.1)))
+            for r in rows
+        ]
+    )
+
+
+def looks_alike(row):
+    return row["wrong"] > ALIKE * row["reported"]
+
+
+def fit(rows):
+    x, y = features(rows), np.where([looks_alike(r) for r in rows], 1.0, -1.0)
+    count = collections.Counter(r["kind"] for r in rows)
+    weight = np.array([1 / count[r["kind"]] for r in rows])
+    weight /= weight.sum()
+
+    def loss(p):
+        margin = y * (x @ p)
+        slope = -weight * y / (1 + np.exp(margin))
+        return (weight * np.logaddexp(0, -margin)).sum() + PENALTY * (p[1:] ** 2).sum() / 2, (
+            x.T @ slope + PENALTY * np.r_[0, p[1:]]
+        )
+
+    return minimize(loss, np.zeros(3), jac=True, method="BFGS").x
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("rows", type=pathlib.Path)
+    parser.add_argument("places", nargs="*", metavar="KIND=SCENE_FOLDER")
+    parser.add_argument("--gather", action="store_true")
+    parser.add_argument("--backend", choices=("cpu", "cuda"), default="cpu")
+    parser.add_argument("--write", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.gather:
+        return gather(arguments.rows, arguments.places, arguments.backend)
+    rows = json.loads(arguments.rows.read_text())
+    for kind in dict.fromkeys(r["kind"] for r in rows):
+        p = fit([r for r in rows if r["kind"] != kind])
+        own = [r for r in rows if r["kind"] == kind]
+        for alike in (True, False):
+            of = [r for r in own if looks_alike(r) == alike]
+            found = sum(features([r])[0] @ p > 0 for r in of)
+            if of:
+                print(
+                    f"{kind:20} {'alike' if alike else 'distinct':9} called alike: {found} of {len(of)}"
+                )
+    p = fit(rows)
+    print("bias, contradicted, edges per scan:", *p.round(3))
+    if arguments.write:
+        names = "kBias", "kContradicted", "kEdgesPerScan"
+        values = ", ".join(f"{name} = {value:.3g}" for name, value in zip(names, p))
+        text = re.sub(r"kBias = .*;", values + ";", HEADER.read_text())
+        HEADER.write_text(text)
+
+
+if __name__ == "__main__":
+    main()
