@@ -13,7 +13,6 @@
 #include "interrupt.hpp"
 #include "maps/python_set.hpp"
 #include "matrix.hpp"
-#include "reconstruction/audit/alike_model.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -254,13 +253,8 @@ void bind_reconstruction(py::module_& m) {
       .def_property_readonly("links", &links_list)
       .def_property_readonly("islands",
                              [](const Reconstruction& map) { return lists_of(map.islands); })
-      .def_property_readonly("agreement",
-                             [](const Reconstruction& map) {
-                               return py::make_tuple(map.agreement.contradicted,
-                                                     map.agreement.edges_per_scan);
-                             })
-      .def_property_readonly("alike_log_odds", [](const Reconstruction& map) {
-        return alike_log_odds(map.agreement);
+      .def_property_readonly("agreement", [](const Reconstruction& map) {
+        return py::make_tuple(map.agreement.contradicted, map.agreement.edges_per_scan);
       });
   py::class_<MapOptions>(m, "ReconstructOptions", "All options of a map of a set.")
       .def(py::init(&map_options), py::arg("registration"), py::arg("graph"), py::arg("audit"),
