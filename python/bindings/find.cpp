@@ -47,7 +47,11 @@ void bind_find(py::module_& m) {
       .def_readonly("doubtful", &R::doubtful,
                     "Poses below min_confidence, as far as they deserve a look.")
       .def_property_readonly(
-          "voxel_size", [](const R& r) { return shortest(r.voxel_size); }, "That was used.")
+          "voxel_size", [](const R& r) { return shortest(r.voxel_size); },
+          "Of the search, that was used.")
+      .def_property_readonly(
+          "evidence_voxel_size", [](const R& r) { return shortest(r.evidence_voxel_size); },
+          "Of the evidence: half of it, or more where points are far apart.")
       .def_readonly("diameter", &R::diameter, "Of the part: diagonal of its box.")
       .def_readonly("scene_extent", &R::scene_extent, "Diagonal of the box of the scene.")
       .def_readonly("part_points", &R::part_points, "Prepared points of the part.")

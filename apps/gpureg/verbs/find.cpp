@@ -60,6 +60,7 @@ Json document(const FindRun& o, const Context& context, const FindResult& result
           {"status", localization::to_string(result.status)},
           {"explanation", explain(result)},
           {"voxel_size", result.voxel_size},
+          {"evidence_voxel_size", result.evidence_voxel_size},
           {"diameter", result.diameter},
           {"scene_extent", result.scene_extent},
           {"points", {{"part", result.part_points}, {"scene", result.scene_points}}},
@@ -91,10 +92,11 @@ Image picture(const PointCloud& part, const PointCloud& scene, const FindResult&
 void print(const FindRun& o, const Context& context, const FindResult& result) {
   std::cout << "part     " << o.part << ": " << grouped(result.part_points) << " points, diameter "
             << significant(result.diameter, 3) << "\n"
-            << "scene    " << o.scene << ": " << grouped(result.scene_points)
-            << " points, voxels of " << significant(static_cast<double>(result.voxel_size), 3)
-            << ", " << grouped(result.neighborhoods) << " neighbourhoods\n"
-            << "backend  " << context.description() << "\n"
+            << "scene    " << o.scene << ": " << grouped(result.scene_points) << " points";
+  if (result.neighborhoods > 0)
+    std::cout << ", voxels of " << significant(static_cast<double>(result.voxel_size), 3) << ", "
+              << grouped(result.neighborhoods) << " neighbourhoods";
+  std::cout << "\nbackend  " << context.description() << "\n"
             << "status   " << localization::to_string(result.status) << ": " << explain(result)
             << "\n";
   const auto print_pose = [](const char* what, std::size_t number, const FoundPart& part) {
@@ -107,8 +109,13 @@ void print(const FindRun& o, const Context& context, const FindResult& result) {
   };
   for (std::size_t k = 0; k < result.instances.size(); ++k)
     print_pose("instance", k + 1, result.instances[k]);
-  if (result.instances.empty() && !result.doubtful.empty())
+  if (result.doubtful.empty()) return;
+  if (result.instances.empty())
     print_pose("doubtful", 1, result.doubtful.front());
+  else
+    std::cout << "doubtful " << result.doubtful.size()
+              << (result.doubtful.size() == 1 ? " pose" : " poses") << " more, up to "
+              << fixed(result.doubtful.front().confidence, 3) << ": --json has them\n";
 }
 
 int run(const FindRun& o) {
@@ -128,6 +135,12 @@ int run(const FindRun& o) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   print(o, context, result);
+  constexpr double kFineOfPart = 0.04;
+  if (result.evidence_voxel_size > kFineOfPart * result.diameter)
+    std::cerr << "gpureg: note: poses are judged in voxels of "
+              << significant(static_cast<double>(result.evidence_voxel_size), 2)
+              << ", which is coarse for this part: a mesh or denser clouds give surer confidences"
+              << std::endl;
   const auto unseen = [](const std::vector<FoundPart>& parts) {
     return !parts.empty() && !parts.front().evidence.viewpoint_known;
   };
