@@ -242,6 +242,7 @@ def main():
     parser.add_argument("--counts", default=",".join(map(str, COUNTS)))
     parser.add_argument("--quality", type=int, default=5)
     parser.add_argument("--backend", default="cpu", choices=("cpu", "cuda"))
+    parser.add_argument("--threads", type=int, default=0, help="of the CPU backend; 0: all")
     parser.add_argument("--unseen", action="store_true", help="without the viewpoint of the scene")
     parser.add_argument(
         "--peer", choices=("opencv",), help="needs opencv-contrib-python; its scores are votes"
@@ -254,7 +255,11 @@ def main():
     else:
         import gpureg
 
-        context = gpureg.Context.cuda() if arguments.backend == "cuda" else gpureg.Context.cpu()
+        context = (
+            gpureg.Context.cuda()
+            if arguments.backend == "cuda"
+            else gpureg.Context.cpu(arguments.threads)
+        )
 
         def run(*of):
             return row_of(gpureg, context, *of)
@@ -270,7 +275,7 @@ def main():
         else []
     )
     done = {(r["kind"], r["seed"], r["count"], r["view"]) for r in rows}
-    for seed in map(int, arguments.seeds.split(",")):
+    for seed in map(int, filter(None, arguments.seeds.split(","))):
         for kind in kinds:
             for count in map(int, arguments.counts.split(",")):
                 if (kind, seed, count, not arguments.unseen) in done:
