@@ -82,11 +82,10 @@ def gather(file, places, backend):
                 [(numbers[rows[k][0]], numbers[rows[k][1]]) for k in chosen],
                 results=[results[k] for k in chosen],
                 options=options,
-                audit=False,
                 refine=False,
                 context=context,
             )
-            contradicted, edges_per_scan = made.agreement
+            contradicted, edges_per_scan, jumps = made.agreement
             out.append(
                 {
                     "kind": kind,
@@ -94,6 +93,7 @@ def gather(file, places, backend):
                     "subset": name,
                     "contradicted": round(contradicted, 5),
                     "edges_per_scan": round(edges_per_scan, 3),
+                    "jumps": round(jumps, 4),
                     "reported": len(reported),
                     "wrong": sum(wrong[k] for k in reported),
                 }
@@ -105,7 +105,12 @@ def gather(file, places, backend):
 def features(rows):
     return np.array(
         [
-            (1, np.log(max(r["contradicted"], 1e-3)), np.log(max(r["edges_per_scan"], 0.1)))
+            (
+                1,
+                np.log(max(r["contradicted"], 1e-3)),
+                np.log(max(r["edges_per_scan"], 0.1)),
+                r["jumps"],
+            )
             for r in rows
         ]
     )
@@ -128,7 +133,7 @@ def fit(rows):
             x.T @ slope + PENALTY * np.r_[0, p[1:]]
         )
 
-    return minimize(loss, np.zeros(3), jac=True, method="BFGS").x
+    return minimize(loss, np.zeros(4), jac=True, method="BFGS").x
 
 
 def main():
@@ -155,9 +160,9 @@ def main():
                     f"{kind:20} {'alike' if alike else 'distinct':9} called alike: {found} of {len(of)}"
                 )
     p = fit(rows)
-    print("bias, contradicted, edges per scan:", *p.round(3))
+    print("bias, contradicted, edges per scan, jumps:", *p.round(3))
     if arguments.write:
-        names = "kBias", "kContradicted", "kEdgesPerScan"
+        names = "kBias", "kContradicted", "kEdgesPerScan", "kJumps"
         values = ", ".join(f"{name} = {value:.3g}" for name, value in zip(names, p))
         text = re.sub(r"kBias = .*;", values + ";", HEADER.read_text())
         HEADER.write_text(text)

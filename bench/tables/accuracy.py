@@ -95,23 +95,6 @@ def closing_loops():
     return out
 
 
-def loop_consistency_fresh():
-    record = load("loop_consistency_fresh.json")
-    out = [
-        "| scene | first correct, % | R@P95, % | R@P99, % | ECE | correct above 0.9 |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
-    for scene in record["scenes"]:
-
-        def of(key, digits):
-            return f"{scene['before'][key]:.{digits}f} -> {scene['after'][key]:.{digits}f}"  # noqa: B023
-
-        out.append(
-            f"| {scene['scene']} | {of('raw_recall', 1)} | {of('R@P95', 1)} | {of('R@P99', 1)} | {of('calibration_error', 3)} | {of('right_above_0.9', 1)} |"
-        )
-    return out
-
-
 FRONT_SCENES = {
     "houses A, B, hospital E": ("house/A", "house/B", "hospital/E"),
     "red kitchen": ("redkitchen/fragments",),
@@ -394,7 +377,6 @@ TABLES = {
     "redkitchen": redkitchen,
     "kinds_of_places": kinds_of_places,
     "loop_consistency": loop_consistency,
-    "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,
     "few_points": few_points,
     "front": front,

@@ -201,9 +201,10 @@ class Map:
         return self._places_look_alike
 
     @property
-    def agreement(self) -> tuple[float, float]:
-        """Share of the confidence of all pairs that contradicts the others, and the pairs that agree
-        for each scan; what `places_look_alike` is decided by.
+    def agreement(self) -> tuple[float, float, float]:
+        """What `places_look_alike` is decided by: the share of the confidence of all pairs that
+        contradicts the others, the pairs that agree for each scan, and the share of long steps
+        between scans of consecutive numbers.
         """
         return self._graph.agreement
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "pair_results.hpp"
+#include "reconstruction/audit/alike_model.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -18,6 +19,10 @@ constexpr std::uint32_t kStations = 40, kBay = 14, kSecond = 26;
 
 std::vector<Eigen::Vector3d> sensors() {
   return std::vector<Eigen::Vector3d>(kStations, Eigen::Vector3d::Zero());
+}
+
+bool looks_alike(double contradicted, double edges_per_scan, double jumps) {
+  return alike_log_odds({contradicted, edges_per_scan, jumps}) > 0;
 }
 
 /// A path through two bays that look alike: scans 0 to 13 and 26 to 39, of which those 26 numbers
@@ -66,7 +71,10 @@ struct TwinBays : PairResults {
 
   bool look_alike() const { return look_alike(reconstruct_from_poses(kStations, pairs, results)); }
   bool look_alike(const Reconstruction& map) const {
-    return places_look_alike(map, sensors(), pairs, results);
+    return looks_alike(map.agreement.contradicted, map.agreement.edges_per_scan, jumps(map));
+  }
+  double jumps(const Reconstruction& map) const {
+    return jumps_along_the_path(map, sensors(), pairs, results);
   }
 };
 
@@ -91,40 +99,33 @@ TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
   EXPECT_FALSE(set.look_alike());
 }
 
-/// A map of those shares, without a step of the path.
-bool agreement_looks_alike(double contradicted, double edges_per_scan) {
-  Reconstruction map;
-  map.agreement = {contradicted, edges_per_scan};
-  return places_look_alike(map, sensors(), {}, {});
-}
-
 TEST(Path, PairsThatContradictEachOtherShowAliases) {
   // The more pairs a scan has, the fewer are wrong in the end where places differ.
-  EXPECT_FALSE(agreement_looks_alike(0.01, 5));
-  EXPECT_TRUE(agreement_looks_alike(0.1, 5));
-  EXPECT_FALSE(agreement_looks_alike(0.04, 2));
-  EXPECT_TRUE(agreement_looks_alike(0.3, 2));
-  EXPECT_FALSE(agreement_looks_alike(0.2, 1));
-  EXPECT_FALSE(agreement_looks_alike(0, 9));
+  EXPECT_FALSE(looks_alike(0.01, 5, 0));
+  EXPECT_TRUE(looks_alike(0.1, 5, 0));
+  EXPECT_FALSE(looks_alike(0.04, 2, 0));
+  EXPECT_TRUE(looks_alike(0.3, 2, 0));
+  EXPECT_FALSE(looks_alike(0.2, 1, 0));
+  EXPECT_FALSE(looks_alike(0, 9, 0));
 }
 
-/// A map of all scans at two places, as aliases make it, without any rejected pair.
-bool folded_path_looks_alike(const TwinBays& set) {
+/// Agreement::jumps of a map of all scans at two places, as aliases make it.
+double jumps_of_folded_path(const TwinBays& set) {
   Reconstruction map = reconstruct_from_poses(kStations, set.pairs, set.results);
   map.islands.resize(1);
-  map.agreement = {};
-  for (Edge& edge : map.edges) edge.accepted = true;
   for (std::uint32_t k = 0; k < kStations; ++k) {
     map.scans[k].placed = true;
     map.scans[k].island = 0;
     map.scans[k].island_from_scan = set.world_from_scan[k];
     if (k >= kSecond) map.scans[k].island_from_scan.translation().x() += k < 33 ? -26 : 26;
   }
-  return set.look_alike(map);
+  return set.jumps(map);
 }
 
 TEST(Path, ScansThatJumpAlongAPathShowAliases) {
-  EXPECT_TRUE(folded_path_looks_alike(TwinBays(in_order())));
+  EXPECT_DOUBLE_EQ(jumps_of_folded_path(TwinBays(in_order())), 2.0 / 39);
+  EXPECT_FALSE(looks_alike(0.02, 3, 0));
+  EXPECT_TRUE(looks_alike(0.02, 3, 0.5));
 }
 
 TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
@@ -153,7 +154,7 @@ std::vector<std::uint32_t> in_any_order() {
 TEST(Path, NumbersInAnyOrderSayNothing) {
   const TwinBays set(in_any_order());
   EXPECT_FALSE(set.trusted().has_value());
-  EXPECT_FALSE(folded_path_looks_alike(set));
+  EXPECT_EQ(jumps_of_folded_path(set), 0);
 }
 
 }  // namespace

@@ -85,7 +85,8 @@ Json map_document(const MapRun& run, const Context& context) {
   json["audit"] = run.made.audit ? audit_json(*run.made.audit, run.scene.scans) : Json(nullptr);
   json["places_look_alike"] = run.made.places_look_alike;
   json["agreement"] = {{"contradicted", run.made.map.agreement.contradicted},
-                       {"edges_per_scan", run.made.map.agreement.edges_per_scan}};
+                       {"edges_per_scan", run.made.map.agreement.edges_per_scan},
+                       {"jumps", run.made.map.agreement.jumps}};
   json["edges"] = Json::array();
   for (const reconstruction::Edge& edge : run.made.map.edges)
     json["edges"].push_back({{"i", run.scene.numbers[edge.target]},

@@ -142,6 +142,9 @@ struct Agreement {
   /// others.
   double contradicted = 0;
   double edges_per_scan = 0;  ///< edges that agree, for each scan that has an edge
+  /// Share of the steps between scans of consecutive numbers that are longer than steps of
+  /// confident pairs; 0 where the numbers are not known to follow a path. Of reconstruct() alone.
+  double jumps = 0;
 };
 
 /// A map: a plain value.

@@ -254,7 +254,8 @@ void bind_reconstruction(py::module_& m) {
       .def_property_readonly("islands",
                              [](const Reconstruction& map) { return lists_of(map.islands); })
       .def_property_readonly("agreement", [](const Reconstruction& map) {
-        return py::make_tuple(map.agreement.contradicted, map.agreement.edges_per_scan);
+        const Agreement& of = map.agreement;
+        return py::make_tuple(of.contradicted, of.edges_per_scan, of.jumps);
       });
   py::class_<MapOptions>(m, "ReconstructOptions", "All options of a map of a set.")
       .def(py::init(&map_options), py::arg("registration"), py::arg("graph"), py::arg("audit"),

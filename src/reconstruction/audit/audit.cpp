@@ -15,6 +15,7 @@
 #include "fields/validate.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "reconstruction/audit/alike_model.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/companions.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
@@ -326,10 +327,13 @@ AuditedReconstruction reconstruct_in_units(
   std::vector<RegistrationResult> left = with_likely_modes(results, options);
   std::vector<Edge> ruled_out;
   const std::vector<Eigen::Vector3d> sensors = sensors_of(clouds);
-  out.places_look_alike =
-      odometry.empty() &&
-      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, left, options), sensors, pairs,
-                        left);
+  Agreement agreement;
+  if (odometry.empty()) {
+    const Reconstruction map = reconstruct_from_poses(clouds.size(), pairs, left, options);
+    agreement = map.agreement;
+    agreement.jumps = jumps_along_the_path(map, sensors, pairs, left);
+    out.places_look_alike = alike_log_odds(agreement) > 0;
+  }
   bool heard_alone = false;
   if (out.places_look_alike) {
     if (const auto trusted = pairs_along_the_path(sensors, pairs, left, options)) {
@@ -365,6 +369,7 @@ AuditedReconstruction reconstruct_in_units(
     if (!changed) break;
   }
   add_ruled_out(ruled_out, out.map);
+  if (odometry.empty()) out.map.agreement = agreement;
   judge_edges(out.audit, audit_options, out.places_look_alike, out.map);
   if (heard_alone)
     for (Edge& edge : out.map.edges)

@@ -8,7 +8,6 @@
 
 #include "common/stop_scope.hpp"
 #include "math/trigonometry.hpp"
-#include "reconstruction/audit/alike_model.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -18,8 +17,6 @@ constexpr double kConfident = 0.9;
 /// Modes of a pair that are asked, and the least confidence of one.
 constexpr std::size_t kModes = 4;
 constexpr double kLeastOfMode = 0.1;
-/// Consecutive scans that are too far apart for one to be a pause of the sensor.
-constexpr std::size_t kSeveral = 2;
 /// A rival at another pose that is as likely as not.
 constexpr double kRival = 0.5;
 /// Scans so many numbers apart are as if they had none.
@@ -259,26 +256,20 @@ class Growth {
 
 }  // namespace
 
-bool places_look_alike(const Reconstruction& map, const std::vector<Eigen::Vector3d>& sensors,
-                       const std::vector<Pair>& pairs,
-                       const std::vector<RegistrationResult>& results) {
-  if (alike_log_odds(map.agreement) > 0) return true;
-  std::vector<double> steps;
-  for (const Edge& edge : map.edges) {
-    const Pair pair{edge.source, edge.target};
-    if (edge.pair_confidence >= kConfident && gap_of(pair) == 1)
-      steps.push_back(step_of(pair, edge.target_from_source, sensors));
-  }
-  if (steps.size() < kLeastSteps) return false;
-  const double max_step = kLongestStep * quantile(std::move(steps));
-  std::size_t far_apart = 0;
+double jumps_along_the_path(const Reconstruction& map, const std::vector<Eigen::Vector3d>& sensors,
+                            const std::vector<Pair>& pairs,
+                            const std::vector<RegistrationResult>& results) {
+  const Path path = path_of(sensors, pairs, results);
+  if (!path.known) return 0;
+  double steps = 0, jumps = 0;
   for (std::uint32_t k = 1; k < map.scans.size(); ++k) {
     const Scan &a = map.scans[k - 1], &b = map.scans[k];
-    far_apart +=
-        a.placed && b.placed && a.island == b.island &&
-        step_of({k, k - 1}, a.island_from_scan.inverse() * b.island_from_scan, sensors) > max_step;
+    if (!a.placed || !b.placed || a.island != b.island) continue;
+    ++steps;
+    jumps += step_of({k, k - 1}, a.island_from_scan.inverse() * b.island_from_scan, sensors) >
+             path.max_step;
   }
-  return far_apart >= kSeveral && path_of(sensors, pairs, results).known;
+  return steps > 0 ? jumps / steps : 0;
 }
 
 std::optional<std::vector<char>> pairs_along_the_path(

@@ -8,15 +8,12 @@
 
 namespace gpureg::reconstruction {
 
-/// Whether places of this building look alike, so that pairs that agree may be wrong together:
-/// * more of the confidence of all pairs contradicts the others than in sets of distinct places,
-/// * or several scans of consecutive numbers lie farther apart than others, and the numbers are
-///   known to follow a path.
+/// Agreement::jumps of a map.
 /// @param sensors where the sensor of each scan was, in its frame, metres.
 /// @param pairs, results what the map was made of.
-bool places_look_alike(const Reconstruction& map, const std::vector<Eigen::Vector3d>& sensors,
-                       const std::vector<Pair>& pairs,
-                       const std::vector<RegistrationResult>& results);
+double jumps_along_the_path(const Reconstruction& map, const std::vector<Eigen::Vector3d>& sensors,
+                            const std::vector<Pair>& pairs,
+                            const std::vector<RegistrationResult>& results);
 
 /// The pairs that are trusted where places look alike. Scans are numbered along the path of the
 /// sensor: pairs of scans that follow each other overlap far more often than others, and no two of
