@@ -43,12 +43,13 @@ void set_voxel_size_origin(VoxelSizeOrigin origin) { voxel_size_origin() = origi
 
 std::string in_option_names(std::string message) {
   if (message.rfind("--set ", 0) == 0) return message;  // it lists fields
-  const std::array<std::pair<const char*, std::string>, 6> names{{
+  const std::array<std::pair<const char*, std::string>, 7> names{{
       {"suggest_voxel_size()", "--voxel-size auto"},
       {"voxel_size", voxel_size_option()},
       {"min_confidence", "--min-confidence"},
       {"accept_symmetry", "--set accept_symmetry=true"},
       {"loop_consistency()", "`gpureg consistency`"},
+      {"find()", "`gpureg find`"},
       {"a RegistrationPrior", "--up"},
   }};
   for (const auto& [name, option] : names) replace(message, name, option);

@@ -246,7 +246,9 @@ const char* advice(RegistrationReason reason) {
     case RegistrationReason::outside_fitted_range:
       return "suggest_voxel_size(), or a calibration to your sensor";
     case RegistrationReason::confidence_too_low:
-      return "a calibration to your sensor, or a lower min_confidence";
+      return "find(), if one of the clouds is a part of the other; a calibration to your sensor, "
+             "or "
+             "a lower min_confidence";
     case RegistrationReason::flat_with_solid:
       return "the points at the scanner's height, cut out of the cloud that is not flat";
     case RegistrationReason::contradicts_loops:
