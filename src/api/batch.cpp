@@ -2,12 +2,11 @@
 #include "api/batch.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <utility>
 
 #include "api/engine_calls.hpp"
 #include "api/outcome.hpp"
-#include "api/pair_input.hpp"
+#include "common/for_each_on.hpp"
 #include "common/host_threads.hpp"
 #include "common/stop_scope.hpp"
 
@@ -41,15 +40,15 @@ Batch::Chunk Batch::next_chunk() {
   const RegistrationPrior nothing;
   for (; next_ < end; ++next_) {
     const PairVariant& v = variants_[next_];
-    const bool swapped = swaps(*v.source, *v.target, options_);
+    const AlignedPair& pair = out.pairs.emplace_back(*v.source, *v.target, options_);
     const RegistrationPrior& prior = priors_.empty() ? nothing : priors_[v.pair];
-    out.inputs.push_back(input_of(*v.source, *v.target, swapped, prior));
+    out.inputs.push_back(pair.input(prior));
     if (!prior.correspondences) continue;
     // The other sides of a cloud have its points in its order.
     std::vector<std::uint32_t> source, target;
     for (const Correspondence& c : *prior.correspondences) {
-      source.push_back(swapped ? c.target : c.source);
-      target.push_back(swapped ? c.source : c.target);
+      source.push_back(pair.swapped ? c.target : c.source);
+      target.push_back(pair.swapped ? c.source : c.target);
     }
     out.inputs.back().custom_source = span_of(source);
     out.inputs.back().custom_target = span_of(target);
@@ -81,22 +80,14 @@ void Batch::align(Chunk& chunk) const {
   }
 }
 
-RegistrationResult Batch::result_of(const Chunk& chunk, std::size_t place) const {
-  const PairVariant& v = variants_[chunk.first + place];
-  return to_result(chunk.outcomes[place],
-                   {*v.source, *v.target, swaps(*v.source, *v.target, options_), options_},
-                   chunk.inputs[place].prior);
-}
-
-void Batch::conclude(const Chunk& chunk) {
+void Batch::conclude(Chunk& chunk) {
   std::vector<RegistrationResult> found(chunk.size());
   // A result by evidence takes about 100 us on the host, too much for one thread where a device
   // makes thousands per second. A pair whose symmetry is tested takes milliseconds, so the threads
   // take one pair after the other.
   const std::size_t workers = std::min<std::size_t>(engine_.host_threads(), 1 + chunk.size() / 16);
-  std::atomic<std::size_t> next{0};
-  on_threads(workers, [&](std::size_t) {
-    for (std::size_t k = next++; k < chunk.size(); k = next++) found[k] = result_of(chunk, k);
+  for_each_on(workers, chunk.size(), [&](std::size_t k) {
+    found[k] = to_result(std::move(chunk.outcomes[k]), chunk.pairs[k], chunk.inputs[k].prior);
   });
   for (std::size_t k = 0; k < chunk.size(); ++k) {
     const std::size_t variant = chunk.first + k, pair = variants_[variant].pair;
@@ -120,7 +111,10 @@ std::vector<RegistrationResult> Batch::run() {
       align(now);
     }
     before = std::move(now);
-    if (!overlap) conclude(std::exchange(before, Chunk()));
+    if (!overlap) {
+      conclude(before);
+      before = Chunk();
+    }
   }
   if (before.size() > 0) conclude(before);
   return std::move(results_);

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "api/aligned_pair.hpp"
 #include "api/variants.hpp"
 #include "pipeline/engine.hpp"
 
@@ -26,6 +27,7 @@ class Batch {
  private:
   struct Chunk {
     std::size_t first = 0;  ///< of its variants, which are all those of its pairs
+    std::vector<AlignedPair> pairs;
     std::vector<PairInput> inputs;
     std::vector<PairOutcome> outcomes;
     std::vector<std::vector<std::uint32_t>> given;  ///< indices of correspondences, for inputs
@@ -37,9 +39,8 @@ class Batch {
     return variant == 0 || variants_[variant].pair != variants_[variant - 1].pair;
   }
   void align(Chunk& chunk) const;
-  /// Results of an aligned chunk, to the callback too.
-  void conclude(const Chunk& chunk);
-  RegistrationResult result_of(const Chunk& chunk, std::size_t place) const;
+  /// Results of an aligned chunk, to the callback too. Its outcomes are used up.
+  void conclude(Chunk& chunk);
 
   Engine& engine_;
   const std::vector<PairVariant>& variants_;

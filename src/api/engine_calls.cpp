@@ -57,9 +57,8 @@ std::vector<PairOutcome> verify_in_parts(Engine& engine, const std::vector<PairI
 
 Pose<double> planar(const Pose<double>& pose, const PairInput& pair) {
   const PreparedState &moved = *pair.source, &fixed = *pair.target;
-  const UnalignedIsometry3d found = to_transform(pose, moved, fixed, false);
-  return to_local_of_rows(planar(found, moved.plane, fixed.plane, origin_of(moved)), moved, fixed,
-                          false);
+  const UnalignedIsometry3d found = rows_from_local(pose, moved, fixed);
+  return local_from_rows(planar(found, moved.plane, fixed.plane, origin_of(moved)), moved, fixed);
 }
 
 Poses planar_poses(const PairOutcome& outcome, const PairInput& pair) {

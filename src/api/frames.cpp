@@ -27,37 +27,29 @@ CorrespondenceMoments to_frame(const Moments& m, const PreparedState& cloud) {
   return out;
 }
 
-/// The pose of the pair as the caller knows it: his source, his target, their frames.
-UnalignedIsometry3d to_transform(const Pose<double>& pose, const PreparedState& source,
-                                 const PreparedState& target, bool swapped) {
-  const PreparedState& moved = swapped ? target : source;
-  const PreparedState& fixed = swapped ? source : target;
+Eigen::Isometry3d rows_from_local(const Pose<double>& pose, const PreparedState& moved,
+                                  const PreparedState& fixed) {
   const Eigen::Quaterniond q(pose.w, pose.x, pose.y, pose.z);
   Eigen::Isometry3d fixed_from_moved = Eigen::Isometry3d::Identity();
   fixed_from_moved.linear() = q.normalized().toRotationMatrix();
   fixed_from_moved.translation() = Eigen::Vector3d(pose.tx, pose.ty, pose.tz) + origin_of(fixed) -
                                    fixed_from_moved.linear() * origin_of(moved);
-  return swapped ? fixed_from_moved.inverse() : fixed_from_moved;
+  return fixed_from_moved;
 }
 
-Pose<double> to_local_of_rows(const UnalignedIsometry3d& target_from_source,
-                              const PreparedState& source, const PreparedState& target,
-                              bool swapped) {
-  Eigen::Isometry3d pose(target_from_source.matrix());
-  if (swapped) pose = pose.inverse();
-  const PreparedState& moved = swapped ? target : source;
-  const PreparedState& fixed = swapped ? source : target;
-  const Eigen::Vector3d shift =
-      pose.translation() + pose.linear() * origin_of(moved) - origin_of(fixed);
-  const Eigen::Quaterniond q = Eigen::Quaterniond(pose.linear()).normalized();
+Pose<double> local_from_rows(const Eigen::Isometry3d& fixed_from_moved, const PreparedState& moved,
+                             const PreparedState& fixed) {
+  const Eigen::Vector3d shift = fixed_from_moved.translation() +
+                                fixed_from_moved.linear() * origin_of(moved) - origin_of(fixed);
+  const Eigen::Quaterniond q = Eigen::Quaterniond(fixed_from_moved.linear()).normalized();
   return {q.w(), q.x(), q.y(), q.z(), shift.x(), shift.y(), shift.z()};
 }
 
-Pose<double> to_local(const UnalignedIsometry3d& target_from_source, const PreparedState& source,
-                      const PreparedState& target, bool swapped) {
-  UnalignedIsometry3d of_rows = target_from_source;
-  of_rows.translation() = target_from_source * offset_of(source) - offset_of(target);
-  return to_local_of_rows(of_rows, source, target, swapped);
+Eigen::Isometry3d rows_from_frames(const UnalignedIsometry3d& target_from_source,
+                                   const PreparedState& source, const PreparedState& target) {
+  Eigen::Isometry3d out = target_from_source;
+  out.translation() = target_from_source * offset_of(source) - offset_of(target);
+  return out;
 }
 
 void move_to_frame(UnalignedIsometry3d& target_from_source, const PreparedState& source,

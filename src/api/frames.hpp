@@ -37,16 +37,15 @@ inline Eigen::Vector3d offset_of(const PreparedState& cloud) {
 /// Moments of the local, scaled points to moments of the caller's rows.
 CorrespondenceMoments to_frame(const Moments& moments, const PreparedState& cloud);
 
-/// A local pose of the moved into the fixed cloud as target_from_source between the caller's rows.
-UnalignedIsometry3d to_transform(const Pose<double>& pose, const PreparedState& source,
-                                 const PreparedState& target, bool swapped);
+/// A local pose of the moved in the fixed cloud as one between the caller's rows, and back.
+Eigen::Isometry3d rows_from_local(const Pose<double>& pose, const PreparedState& moved,
+                                  const PreparedState& fixed);
+Pose<double> local_from_rows(const Eigen::Isometry3d& fixed_from_moved, const PreparedState& moved,
+                             const PreparedState& fixed);
 
-/// The other way round, and of target_from_source between the clouds' frames.
-Pose<double> to_local_of_rows(const UnalignedIsometry3d& target_from_source,
-                              const PreparedState& source, const PreparedState& target,
-                              bool swapped);
-Pose<double> to_local(const UnalignedIsometry3d& target_from_source, const PreparedState& source,
-                      const PreparedState& target, bool swapped);
+/// A pose between the clouds' frames as one between their rows.
+Eigen::Isometry3d rows_from_frames(const UnalignedIsometry3d& target_from_source,
+                                   const PreparedState& source, const PreparedState& target);
 
 /// A pose and moments between the rows of two clouds into the clouds' frames.
 void move_to_frame(UnalignedIsometry3d& target_from_source, const PreparedState& source,

@@ -19,53 +19,111 @@ constexpr double kWorthTesting = 0.05;
 /// Prepared points of the largest cloud whose symmetry is tested; parts have some thousand.
 constexpr std::uint32_t kLargestSymmetric = 200'000;
 
-RegistrationReason evidence_reason(const RegistrationResult& result, bool contradicted,
-                                   const RegistrationSettings& options) {
-  const RegistrationStatistics& s = result.statistics;
-  if (s.source_points < limits::kMinMatches) return RegistrationReason::too_few_source_points;
-  if (s.target_points < limits::kMinMatches) return RegistrationReason::too_few_target_points;
-  if (s.correspondences < limits::kMinMatches) return RegistrationReason::no_usable_features;
-  if (s.scored == 0)
-    return diagnose(result) == RegistrationReason::too_few_points
-               ? RegistrationReason::too_few_points
-               : RegistrationReason::degenerate_geometry;
-  if (contradicted) return RegistrationReason::contradicts_prior;
-  if (result.confidence >= options.min_confidence) return RegistrationReason::none;
-  if (result.symmetry_confidence() < options.min_confidence) return diagnose(result);
-  return options.accept_symmetry ? RegistrationReason::none : RegistrationReason::symmetric;
-}
-
-RegistrationStatus status_of(const RegistrationResult& result,
-                             const RegistrationSettings& options) {
-  if (result.reason != RegistrationReason::none) return RegistrationStatus::not_aligned;
-  return result.confidence >= options.min_confidence ? RegistrationStatus::aligned
-                                                     : RegistrationStatus::aligned_up_to_symmetry;
-}
-
-/// A pose under which nothing overlaps is no candidate. Its confidence is 0.
-void drop_candidate(RegistrationResult& result) {
-  result.target_from_source = no_pose();
-  result.modes.clear();
-}
-
-/// The modes of one pair, in the frames of its clouds.
-class Modes {
+/// Makes the result of one pair out of what the engine measured: drops the poses that the pair
+/// forbids, ranks the others, and says what follows from the best one.
+class Conclusion {
  public:
-  Modes(const PairOutcome& outcome, const AlignedPair& pair)
-      : outcome_(outcome), pair_(pair), options_(pair.options) {
-    const std::vector<PoseEvidence> evidence = pair.evidence_of(outcome);
-    for (std::size_t k = 0; k < outcome.modes.size(); ++k) add(k, evidence[k]);
-    const ModeOutcome& first = outcome.modes.front();
-    middle_ = middle_of(pair.source_moments(first), origin_of(pair.source));
+  Conclusion(PairOutcome outcome, const AlignedPair& pair)
+      : outcome_(std::move(outcome)), pair_(pair), options_(pair.options) {}
+
+  RegistrationResult result(const PriorTest& prior) && {
+    const bool contradicted = drop_forbidden_modes(prior);
+    describe_pair();
+    if (options_.method == RegistrationMethod::quadruples) {
+      if (outcome_.has_pose) take_pose();
+    } else if (pair_.source.plane.exists() != pair_.target.plane.exists() &&
+               pair_.source.size > 0 && pair_.target.size > 0) {
+      result_.reason = RegistrationReason::flat_with_solid;
+    } else {
+      if (!outcome_.modes.empty()) {
+        collect_modes();
+        rank_modes();
+        take_best_mode();
+      }
+      result_.reason = evidence_reason(contradicted);
+      // A pose under which nothing overlaps is no candidate. Its confidence is 0.
+      if (result_.reason != RegistrationReason::none && result_.statistics.inliers == 0) {
+        result_.target_from_source = no_pose();
+        result_.modes.clear();
+      }
+    }
+    set_status();
+    return std::move(result_);
+  }
+
+ private:
+  /// Refinement moves poses, so they are asked again. Nothing speaks against a 2-D scan that it
+  /// moved to where nothing overlaps.
+  /// @return whether no mode is left and the prior, or the plane of the scans, has refused some.
+  bool drop_forbidden_modes(const PriorTest& prior) {
+    bool refused_some = false;
+    const auto forbidden = [&](const ModeOutcome& m) {
+      const bool refused =
+          !permitted(prior, to_rigid(m.pose)) || (pair_.flat() && confidence::without_overlap(m));
+      refused_some |= refused;
+      return refused || pair_.contradicts_common_view(m);
+    };
+    outcome_.modes.erase(std::remove_if(outcome_.modes.begin(), outcome_.modes.end(), forbidden),
+                         outcome_.modes.end());
+    return outcome_.modes.empty() && refused_some;
+  }
+
+  /// What does not depend on the pose.
+  void describe_pair() {
+    result_.reason = outcome_.reason;
+    result_.statistics = outcome_.statistics;
+    result_.timings = outcome_.timings;
+    result_.source_viewpoint = pair_.source.statistics.viewpoint;
+    result_.target_viewpoint = pair_.target.statistics.viewpoint;
+    result_.statistics.swapped = pair_.swapped;
+    result_.flat = pair_.flat();
+    result_.voxel_size = pair_.target.options.unit;
+    if (!pair_.swapped) return;
+    std::swap(result_.statistics.source_points, result_.statistics.target_points);
+    if (result_.reason == RegistrationReason::too_few_source_points)
+      result_.reason = RegistrationReason::too_few_target_points;
+    else if (result_.reason == RegistrationReason::too_few_target_points)
+      result_.reason = RegistrationReason::too_few_source_points;
+  }
+
+  /// The pose of the quadruples.
+  void take_pose() {
+    result_.target_from_source = pair_.transform_of(outcome_.pose);
+    result_.inlier_ratio = result_.confidence = pipeline::inlier_ratio(outcome_.statistics);
+    result_.inlier_rmse = pair_.rmse(outcome_.support.residual, outcome_.support.inliers);
+    result_.source_moments = pair_.source_moments(outcome_);
+    result_.target_moments = pair_.target_moments(outcome_);
+  }
+
+  /// The modes in the caller's order of the clouds, without those that equal their origin.
+  void collect_modes() {
+    const std::vector<PoseEvidence> evidence = pair_.evidence_of(outcome_);
+    for (std::size_t k = 0; k < outcome_.modes.size(); ++k) {
+      const ModeOutcome& mode = outcome_.modes[k];
+      RegistrationMode out;
+      out.target_from_source = pair_.transform_of(mode.pose);
+      // A perturbed pose within the correspondence distance of its origin is that mode, less well
+      // refined; evidence cannot separate poses that close.
+      const auto [origin, is_first] = origins_.emplace(mode.origin_mode, k);
+      if (!is_first && distance_between(out.target_from_source,
+                                        pair_.transform_of(outcome_.modes[origin->second].pose),
+                                        origin_moments(mode.origin_mode)) <=
+                           static_cast<double>(options_.prepare.max_correspondence_distance))
+        continue;
+      out.evidence = evidence[k];
+      out.rank_before_refinement = static_cast<std::uint32_t>(k);
+      modes_.push_back(out);
+    }
+    middle_ = middle_of(pair_.source_moments(outcome_.modes.front()), origin_of(pair_.source));
   }
 
   /// Ranks the modes by their evidence, drops each that equals a better one, and fills in the
   /// confidences.
-  std::vector<RegistrationMode> ranked() const {
+  void rank_modes() {
     std::vector<PoseEvidence> evidence;
     for (const RegistrationMode& mode : modes_) evidence.push_back(mode.evidence);
     const confidence::Ranking ranking = pair_.ranking_of(evidence);
-    std::vector<RegistrationMode> out;
+    std::vector<RegistrationMode>& out = result_.modes;
     std::vector<confidence::RankedMode> distinct;
     for (const std::size_t k : ranking.order) {
       const RegistrationMode& mode = modes_[k];
@@ -77,27 +135,24 @@ class Modes {
     }
     auto confidences =
         confidence::confidences_of(distinct, ranking.available, options_.evidence.modes);
-    set_confidences(confidences, out);
-    mark_equivalents(distinct, out);
+    set_confidences(confidences);
+    mark_equivalents(distinct);
     std::vector<bool> equivalent;
     for (const RegistrationMode& mode : out) equivalent.push_back(mode.equivalent);
     confidence::calibrate_modes(options_.calibration, equivalent, confidences);
-    set_confidences(confidences, out);
-    return out;
+    set_confidences(confidences);
   }
 
- private:
-  static void set_confidences(const std::vector<confidence::ModeConfidence>& from,
-                              std::vector<RegistrationMode>& modes) {
-    for (std::size_t k = 0; k < modes.size(); ++k) {
-      modes[k].confidence = from[k].confidence;
-      modes[k].overlap_confidence = from[k].overlap_confidence;
+  void set_confidences(const std::vector<confidence::ModeConfidence>& from) {
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      result_.modes[k].confidence = from[k].confidence;
+      result_.modes[k].overlap_confidence = from[k].overlap_confidence;
     }
   }
 
   /// Marks the modes that a symmetry of the larger cloud carries into the first one.
-  void mark_equivalents(const std::vector<confidence::RankedMode>& ranked,
-                        std::vector<RegistrationMode>& modes) const {
+  void mark_equivalents(const std::vector<confidence::RankedMode>& ranked) {
+    std::vector<RegistrationMode>& modes = result_.modes;
     const auto close = [&](std::size_t k) {
       return ranked[k].log_odds >= ranked.front().log_odds - kSimilarLogOdds;
     };
@@ -123,31 +178,53 @@ class Modes {
     }
   }
 
-  /// Moments of the source points in correspondences under the origin mode.
-  CorrespondenceMoments origin_moments(std::uint32_t origin_mode) const {
-    return pair_.source_moments(outcome_.modes[origins_.at(origin_mode)]);
+  void take_best_mode() {
+    const RegistrationMode& first = result_.modes.front();
+    const ModeOutcome& best = outcome_of(first);
+    RegistrationStatistics& s = result_.statistics;
+    result_.target_from_source = first.target_from_source;
+    result_.confidence = first.confidence;
+    s.points_scored = best.source.points(Term::tested);
+    s.inliers = s.consensus = best.source.points(Term::inliers);
+    s.refine_iterations = best.iterations;
+    result_.inlier_ratio = pipeline::inlier_ratio(s);
+    result_.inlier_rmse = pair_.rmse(best.source);
+    result_.source_moments = pair_.source_moments(best);
+    result_.target_moments = pair_.target_moments(best);
   }
 
-  void add(std::size_t k, const PoseEvidence& evidence) {
-    const ModeOutcome& mode = outcome_.modes[k];
-    RegistrationMode out;
-    out.target_from_source = pair_.transform_of(mode.pose);
-    // A perturbed pose within the correspondence distance of its origin is that mode, less well
-    // refined; evidence cannot separate poses that close.
-    const auto [origin, is_first] = origins_.emplace(mode.origin_mode, k);
-    if (!is_first) {
-      const UnalignedIsometry3d before = pair_.transform_of(outcome_.modes[origin->second].pose);
-      if (distance_between(out.target_from_source, before, origin_moments(mode.origin_mode)) <=
-          static_cast<double>(options_.prepare.max_correspondence_distance))
-        return;
-    }
-    out.evidence = evidence;
-    out.rank_before_refinement = static_cast<std::uint32_t>(k);
-    modes_.push_back(out);
+  RegistrationReason evidence_reason(bool contradicted) const {
+    const RegistrationStatistics& s = result_.statistics;
+    if (pair_.flat() && outcome_.modes.empty() && s.scored > 0)
+      return RegistrationReason::confidence_too_low;
+    if (s.source_points < limits::kMinMatches) return RegistrationReason::too_few_source_points;
+    if (s.target_points < limits::kMinMatches) return RegistrationReason::too_few_target_points;
+    if (s.correspondences < limits::kMinMatches) return RegistrationReason::no_usable_features;
+    if (s.scored == 0)
+      return diagnose(result_) == RegistrationReason::too_few_points
+                 ? RegistrationReason::too_few_points
+                 : RegistrationReason::degenerate_geometry;
+    if (contradicted) return RegistrationReason::contradicts_prior;
+    if (result_.confidence >= options_.min_confidence) return RegistrationReason::none;
+    if (result_.symmetry_confidence() < options_.min_confidence) return diagnose(result_);
+    return options_.accept_symmetry ? RegistrationReason::none : RegistrationReason::symmetric;
+  }
+
+  void set_status() {
+    const bool by_evidence = options_.method == RegistrationMethod::compatibility;
+    result_.status = result_.reason != RegistrationReason::none ? RegistrationStatus::not_aligned
+                     : by_evidence && result_.confidence < options_.min_confidence
+                         ? RegistrationStatus::aligned_up_to_symmetry
+                         : RegistrationStatus::aligned;
   }
 
   const ModeOutcome& outcome_of(const RegistrationMode& mode) const {
     return outcome_.modes[mode.rank_before_refinement];
+  }
+
+  /// Moments of the source points in correspondences under the origin mode.
+  CorrespondenceMoments origin_moments(std::uint32_t origin_mode) const {
+    return pair_.source_moments(outcome_.modes[origins_.at(origin_mode)]);
   }
 
   bool same(const RegistrationMode& a, const RegistrationMode& b) const {
@@ -160,98 +237,24 @@ class Modes {
     return same_mode_at(a.target_from_source, b.target_from_source, middle_, options_.evidence);
   }
 
-  const PairOutcome& outcome_;
+  PairOutcome outcome_;
   const AlignedPair& pair_;
   const RegistrationSettings& options_;
+  RegistrationResult result_;
   std::map<std::uint32_t, std::size_t> origins_;  ///< first mode of each origin mode
-  std::vector<RegistrationMode> modes_;
+  std::vector<RegistrationMode> modes_;           ///< that may be ranked
   Eigen::Vector3d middle_;  ///< centre of the source points in correspondences
 };
 
-void add_modes(const PairOutcome& outcome, const AlignedPair& pair, RegistrationResult& result) {
-  result.modes = Modes(outcome, pair).ranked();
-  const ModeOutcome& best = outcome.modes[result.modes.front().rank_before_refinement];
-  result.target_from_source = result.modes.front().target_from_source;
-  result.confidence = result.modes.front().confidence;
-  result.statistics.points_scored = best.source.points(Term::tested);
-  result.statistics.inliers = result.statistics.consensus = best.source.points(Term::inliers);
-  result.statistics.refine_iterations = best.iterations;
-  result.inlier_ratio = pipeline::inlier_ratio(result.statistics);
-  result.inlier_rmse = pair.rmse(best.source);
-  result.source_moments = pair.source_moments(best);
-  result.target_moments = pair.target_moments(best);
-}
-
 }  // namespace
 
-RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair,
+RegistrationResult to_row_result(PairOutcome outcome, const AlignedPair& pair,
                                  const PriorTest& prior) {
-  // Refinement moves poses, so they are asked again. Nothing speaks against a 2-D scan that it
-  // moved to where nothing overlaps.
-  bool contradicts_prior = false;
-  const auto forbidden = [&](const ModeOutcome& m) {
-    const bool refused =
-        !permitted(prior, to_rigid(m.pose)) || (pair.flat() && confidence::without_overlap(m));
-    contradicts_prior |= refused;
-    return refused || pair.contradicts_common_view(m);
-  };
-  const bool some_contradict = std::any_of(all.modes.begin(), all.modes.end(), forbidden);
-  PairOutcome kept;
-  if (some_contradict) {
-    kept = all;
-    kept.modes.erase(std::remove_if(kept.modes.begin(), kept.modes.end(), forbidden),
-                     kept.modes.end());
-  }
-  const PairOutcome& outcome = some_contradict ? kept : all;
-  RegistrationResult result;
-  result.reason = outcome.reason;
-  result.status = outcome.reason == RegistrationReason::none ? RegistrationStatus::aligned
-                                                             : RegistrationStatus::not_aligned;
-  result.statistics = outcome.statistics;
-  result.timings = outcome.timings;
-  result.source_viewpoint = pair.source.statistics.viewpoint;
-  result.target_viewpoint = pair.target.statistics.viewpoint;
-  result.statistics.swapped = pair.swapped;
-  result.flat = pair.flat();
-  result.voxel_size = pair.target.options.unit;
-  if (pair.swapped) {
-    std::swap(result.statistics.source_points, result.statistics.target_points);
-    if (result.reason == RegistrationReason::too_few_source_points)
-      result.reason = RegistrationReason::too_few_target_points;
-    else if (result.reason == RegistrationReason::too_few_target_points)
-      result.reason = RegistrationReason::too_few_source_points;
-  }
-  if (pair.options.method == RegistrationMethod::compatibility) {
-    if (pair.source.plane.exists() != pair.target.plane.exists() && pair.source.size > 0 &&
-        pair.target.size > 0) {
-      result.reason = RegistrationReason::flat_with_solid;
-      result.status = RegistrationStatus::not_aligned;
-      return result;
-    }
-    if (!outcome.modes.empty()) add_modes(outcome, pair, result);
-    result.reason =
-        pair.flat() && outcome.modes.empty() && outcome.statistics.scored > 0
-            ? RegistrationReason::confidence_too_low
-            : evidence_reason(result, outcome.modes.empty() && contradicts_prior, pair.options);
-    result.status = status_of(result, pair.options);
-    if (result.reason != RegistrationReason::none && result.statistics.inliers == 0)
-      drop_candidate(result);
-    return result;
-  }
-  if (!outcome.has_pose) return result;
-
-  result.target_from_source = pair.transform_of(outcome.pose);
-  result.inlier_ratio = pipeline::inlier_ratio(outcome.statistics);
-  result.confidence = result.inlier_ratio;
-  result.inlier_rmse = pair.rmse(outcome.support.residual, outcome.support.inliers);
-  result.source_moments = pair.source_moments(outcome);
-  result.target_moments = pair.target_moments(outcome);
-  return result;
+  return Conclusion(std::move(outcome), pair).result(prior);
 }
 
-RegistrationResult to_result(const PairOutcome& outcome, const AlignedPair& pair,
-                             const PriorTest& prior) {
-  RegistrationResult result = to_row_result(outcome, pair, prior);
+RegistrationResult to_result(PairOutcome outcome, const AlignedPair& pair, const PriorTest& prior) {
+  RegistrationResult result = to_row_result(std::move(outcome), pair, prior);
   move_to_frames(result, pair.source, pair.target);
   return result;
 }

@@ -7,11 +7,11 @@
 namespace gpureg {
 
 /// Converts an outcome to the public result in the frames of the clouds.
-RegistrationResult to_result(const PairOutcome& outcome, const AlignedPair& pair,
+RegistrationResult to_result(PairOutcome outcome, const AlignedPair& pair,
                              const PriorTest& prior = {});
 
 /// The same between the rows of both clouds, without their origins (PointCloudView::origin).
-RegistrationResult to_row_result(const PairOutcome& outcome, const AlignedPair& pair,
+RegistrationResult to_row_result(PairOutcome outcome, const AlignedPair& pair,
                                  const PriorTest& prior = {});
 
 }  // namespace gpureg

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "api/pair_input.hpp"
 
-#include "api/prior.hpp"
 #include "common/shown.hpp"
 
 namespace gpureg {
@@ -41,19 +40,6 @@ void check_pairs(const Context& context, const std::vector<PreparedCloud>& cloud
       used[k] = 1;
     }
   }
-}
-
-bool swaps(const PreparedState& source, const PreparedState& target,
-           const RegistrationSettings& options) {
-  return options.smaller_as_source && target.size < source.size;
-}
-
-PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped,
-                   const RegistrationPrior& prior) {
-  PairInput out =
-      swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
-  out.prior = prior_test(prior, source, target, swapped);
-  return out;
 }
 
 }  // namespace gpureg

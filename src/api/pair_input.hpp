@@ -8,7 +8,7 @@
 #include "gpureg/registration.hpp"
 #include "settings/settings.hpp"
 
-/// From the caller's pairs to those of the engine.
+/// Checks of the caller's pairs.
 namespace gpureg {
 
 /// The state of a cloud that this context and these options can work with. name: for the message.
@@ -23,13 +23,5 @@ void check_pairs(const Context& context, const std::vector<PreparedCloud>& cloud
 
 /// Throws InvalidArgument for clouds whose features cannot be matched.
 void check_features(const PreparedState& source, const PreparedState& target);
-
-/// True where the engine moves the caller's target, being the smaller cloud.
-bool swaps(const PreparedState& source, const PreparedState& target,
-           const RegistrationSettings& options);
-
-/// With the prior, and with the planes of two 2-D scans.
-PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped,
-                   const RegistrationPrior& prior = {});
 
 }  // namespace gpureg

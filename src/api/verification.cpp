@@ -20,6 +20,8 @@ namespace {
 
 /// One pair whose poses are verified.
 struct VerifiedPair : AlignedPair {
+  using AlignedPair::AlignedPair;
+
   PoseVerification verification_of(const ModeOutcome& mode, const PoseEvidence& evidence) const {
     PoseVerification out;
     out.target_from_source = transform_of(mode.pose);
@@ -156,14 +158,13 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
     std::vector<VerifiedPair> verified;
     std::vector<std::vector<Pose<double>>> local(end - begin);
     for (std::size_t v = begin; v < end; ++v) {
-      const PreparedState &s = *variants[v].source, &t = *variants[v].target;
-      const bool swapped = swaps(s, t, options);
-      inputs.push_back(input_of(s, t, swapped));
-      if (s.size > 0 && t.size > 0)
+      const VerifiedPair& pair =
+          verified.emplace_back(*variants[v].source, *variants[v].target, by_evidence);
+      inputs.push_back(pair.input());
+      if (pair.source.size > 0 && pair.target.size > 0)
         inputs.back().custom_source = inputs.back().custom_target = matches;
-      verified.push_back({{s, t, swapped, by_evidence}});
       for (const UnalignedIsometry3d& pose : poses[variants[v].pair])
-        local[v - begin].push_back(to_local(pose, s, t, swapped));
+        local[v - begin].push_back(pair.local_of(pose));
     }
     const std::vector<PairOutcome> outcomes =
         verify_all(engine, inputs, local, by_evidence, refine);

@@ -72,7 +72,8 @@ std::vector<Trial> tried(const Context& context, const PreparedLadder& source,
     trial.result = std::move(results[k]);
     if (!trial.result.has_pose()) return;
     const PreparedState &s = *Access::state(prepared[k]), &t = *Access::state(target.cloud);
-    const Pose<double> local = to_local(trial.result.target_from_source, s, t, false);
+    const Pose<double> local =
+        local_from_rows(rows_from_frames(trial.result.target_from_source, s, t), s, t);
     UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
     pose.linear() = Eigen::Quaterniond(local.w, local.x, local.y, local.z).toRotationMatrix();
     pose.translation() = Eigen::Vector3d(local.tx, local.ty, local.tz);

@@ -61,7 +61,7 @@ TEST(VerifyPoses, InformationMatricesFollowTheirDefinitions) {
   outcome.support = verified.support;
   outcome.source_moments = verified.source;
   outcome.target_moments = verified.target;
-  const RegistrationResult result = to_result(outcome, {*source, *target, false, options});
+  const RegistrationResult result = to_result(outcome, {*source, *target, options});
   ASSERT_GT(count, 500u);
   EXPECT_EQ(result.source_moments.count, count);
   // Fixed point has 12 digits, the scaled float coordinates 7.
