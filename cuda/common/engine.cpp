@@ -183,14 +183,8 @@ std::size_t CudaEngine::pairs_per_chunk(const RegistrationSettings& options) con
   return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
 }
 
-CudaEngine::Clouds CudaEngine::prepare(Span<const RawCloud> clouds,
-                                       const PrepareSettings& options) {
-  return prepare_watched(clouds, options, nullptr);
-}
-
-CudaEngine::Clouds CudaEngine::prepare_watched(Span<const RawCloud> clouds,
-                                               const PrepareSettings& options,
-                                               const SurfaceWatcher& watcher) {
+CudaEngine::Clouds CudaEngine::prepare(Span<const RawCloud> clouds, const PrepareSettings& options,
+                                       const SurfaceWatcher& watcher) {
   if (has_budget()) return prepare_within_budget(clouds, options, watcher);
   if (chunks_of(clouds, kRawPointsPerChunk).size() > 1)
     return prepare_on_lanes(clouds, chunks_of(clouds, kRawPointsPerLane), options, watcher);

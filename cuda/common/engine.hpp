@@ -29,11 +29,9 @@ class CudaEngine final : public DeviceEngine {
   void trim() override;
   std::size_t pairs_per_chunk(const RegistrationSettings& options) const override;
   void check_on_host(const RawCloud& cloud) const override;
-  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareSettings& options) override;
-  std::vector<std::shared_ptr<PreparedState>> prepare_watched(
+  std::vector<std::shared_ptr<PreparedState>> prepare(
       Span<const RawCloud> clouds, const PrepareSettings& options,
-      const SurfaceWatcher& watcher) override;
+      const SurfaceWatcher& watcher = nullptr) override;
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override;
   std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
       Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareSettings& options) override;

@@ -76,7 +76,8 @@ class EngineOfMany final : public DeviceEngine {
 
   void check_on_host(const RawCloud& cloud) const override { engines_[0]->check_on_host(cloud); }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareSettings& options) override {
+                                                      const PrepareSettings& options,
+                                                      const SurfaceWatcher&) override {
     std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
     const std::size_t share = clouds.size / engines_.size();
     SharedRuns runs(clouds.size, std::clamp(share, kMinClouds, kMostMinClouds), kMaxClouds,

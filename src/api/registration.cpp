@@ -143,26 +143,17 @@ std::vector<PreparedCloud> prepare_all(const Context& context,
   const auto owners = replace_rows(*Access::engine(context), options, naming, knowledge, raw);
   UnknownViewpoints unknown(*Access::engine(context), span_of(raw), knowledge, options, scales);
   std::vector<std::shared_ptr<PreparedState>> states;
-  unknown.during([&](const SurfaceWatcher& watcher) {
-    in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
-      const auto work = [&] {
-        Engine& engine = *Access::engine(context);
-        const Span<const RawCloud> run{raw.data() + begin, end - begin};
-        if (!watcher) return engine.prepare(run, options);
-        return engine.prepare_watched(run, options, [&](std::size_t first, auto surfaces) {
-          watcher(begin + first, std::move(surfaces));
-        });
-      };
-      for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
-        set_frame_offset(clouds[states.size()].origin, *state);
-        const OwnedRows& rows = *owners[states.size()];
-        state->plane = rows.extruded.plane();
-        rows.kept.count(state->statistics);
-        rows.extruded.count(state->statistics);
-        rows.seen.count(state->statistics);
-        states.push_back(std::move(state));
-      }
-    });
+  in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
+    const auto work = [&] { return unknown.prepare(begin, end); };
+    for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
+      set_frame_offset(clouds[states.size()].origin, *state);
+      const OwnedRows& rows = *owners[states.size()];
+      state->plane = rows.extruded.plane();
+      rows.kept.count(state->statistics);
+      rows.extruded.count(state->statistics);
+      rows.seen.count(state->statistics);
+      states.push_back(std::move(state));
+    }
   });
   for (std::size_t k = 0; k < states.size(); ++k)
     naming(k, [&] { check_viewpoints(knowledge[k], *states[k]); });

@@ -35,13 +35,10 @@ class Engine {
   virtual std::size_t pairs_per_chunk(const RegistrationSettings& options) const = 0;
   /// Throws InvalidArgument for rows that the host cannot read.
   virtual void check_on_host(const RawCloud&) const {}
-  virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                              const PrepareSettings& options) = 0;
-  /// The same; the watcher may get the surfaces of some of the clouds before the end.
-  virtual std::vector<std::shared_ptr<PreparedState>> prepare_watched(
-      Span<const RawCloud> clouds, const PrepareSettings& options, const SurfaceWatcher&) {
-    return prepare(clouds, options);
-  }
+  /// The watcher, which may be empty, may get the surfaces of some of the clouds before the end.
+  virtual std::vector<std::shared_ptr<PreparedState>> prepare(
+      Span<const RawCloud> clouds, const PrepareSettings& options,
+      const SurfaceWatcher& watcher = nullptr) = 0;
   virtual void align(Span<const PairInput> pairs, const RegistrationSettings& options,
                      Span<PairOutcome> outcomes) = 0;
   /// The feature matches that align() starts with (RegistrationMethod::compatibility).

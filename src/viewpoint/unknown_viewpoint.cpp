@@ -3,14 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <condition_variable>
-#include <deque>
-#include <mutex>
 #include <thread>
 #include <utility>
 
 #include "algorithm/cell.hpp"
-#include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
@@ -35,54 +31,6 @@ Vec3 origin_of_rows(const CloudKnowledge& known) {
   return {static_cast<float>(-known.origin[0]), static_cast<float>(-known.origin[1]),
           static_cast<float>(-known.origin[2])};
 }
-
-/// Surfaces on their way from a preparation to the decisions.
-class SurfaceQueue {
- public:
-  struct Chunk {
-    std::size_t first;  ///< cloud
-    std::vector<EarlySurface> surfaces;
-  };
-  void push(Chunk chunk) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      chunks_.push_back(std::move(chunk));
-    }
-    changed_.notify_one();
-  }
-  /// Waits for the next chunk; none once the preparation has ended.
-  std::optional<Chunk> pop() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || !chunks_.empty(); });
-    if (chunks_.empty()) return std::nullopt;
-    std::optional<Chunk> out(std::move(chunks_.front()));
-    chunks_.pop_front();
-    return out;
-  }
-  /// Ends the queue, also where the preparation fails.
-  class Closing {
-   public:
-    explicit Closing(SurfaceQueue& queue) : queue_(queue) {}
-    ~Closing() {
-      {
-        const std::lock_guard<std::mutex> lock(queue_.mutex_);
-        queue_.closed_ = true;
-      }
-      queue_.changed_.notify_one();
-    }
-    Closing(const Closing&) = delete;
-    Closing& operator=(const Closing&) = delete;
-
-   private:
-    SurfaceQueue& queue_;
-  };
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Chunk> chunks_;
-  bool closed_ = false;
-};
 
 /// Points of a prepared cloud with other sides, as input of a preparation that keeps them.
 struct Replacement {
@@ -263,29 +211,37 @@ void UnknownViewpoints::measure_rows(std::size_t cloud) {
     spread_[cloud] = spacing_spread(raw_[cloud], origin_of_rows(knowledge_[cloud]));
 }
 
-void UnknownViewpoints::during(const std::function<void(const SurfaceWatcher&)>& prepare) {
+void UnknownViewpoints::meanwhile(std::function<void()> work) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  early_ = std::async([before = std::move(early_), work = std::move(work)]() mutable {
+    if (before.valid()) before.get();
+    work();
+  });
+}
+
+std::vector<std::shared_ptr<PreparedState>> UnknownViewpoints::prepare(std::size_t begin,
+                                                                       std::size_t end) {
   std::vector<std::size_t> asked;
   bool any_open = false;
   for (std::size_t k = 0; k < raw_.size; ++k) {
     any_open = any_open || is_open(k);
     if (asks_rows(k)) asked.push_back(k);
   }
-  if (!any_open || !scales_.empty() || !engine_.leaves_host_idle()) return prepare(nullptr);
-  SurfaceQueue queue;
-  on_threads(2, [&](std::size_t thread) {
-    if (thread == 0) {
-      const SurfaceQueue::Closing closing(queue);
-      return prepare([&](std::size_t first, std::vector<EarlySurface> surfaces) {
-        queue.push({first, std::move(surfaces)});
+  SurfaceWatcher watcher;
+  if (any_open && scales_.empty() && engine_.leaves_host_idle()) {
+    if (!early_.valid())
+      meanwhile([this, asked = std::move(asked)] {
+        threads().parallel(asked.size(), [&](std::size_t k) { measure_rows(asked[k]); });
       });
-    }
-    threads().parallel(asked.size(), [&](std::size_t k) { measure_rows(asked[k]); });
-    while (auto chunk = queue.pop())
-      threads().parallel(chunk->surfaces.size(), [&](std::size_t k) {
-        EarlySurface& surface = chunk->surfaces[k];
-        decide(chunk->first + k, std::move(surface), surface.origin);
+    watcher = [this, begin](std::size_t first, std::vector<EarlySurface> chunk) {
+      meanwhile([this, first = begin + first, chunk = std::move(chunk)]() mutable {
+        threads().parallel(chunk.size(), [&](std::size_t k) {
+          decide(first + k, std::move(chunk[k]), chunk[k].origin);
+        });
       });
-  });
+    };
+  }
+  return engine_.prepare({raw_.data + begin, end - begin}, options_, watcher);
 }
 
 void UnknownViewpoints::decide(std::size_t cloud, PointsAndNormals surface,
@@ -352,6 +308,7 @@ void UnknownViewpoints::set_statistics(std::size_t cloud, PrepareStatistics& sta
 }
 
 void UnknownViewpoints::resolve(std::vector<std::shared_ptr<PreparedState>>& states) {
+  if (early_.valid()) early_.get();
   std::vector<std::size_t> undecided;
   for (std::size_t k = 0; k < states.size(); ++k)
     if (is_open(k) && !decisions_[k].made && states[k]->size > 0) undecided.push_back(k);

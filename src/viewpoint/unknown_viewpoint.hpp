@@ -2,7 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -45,9 +47,9 @@ class UnknownViewpoints {
                     const std::vector<CloudKnowledge>& knowledge, const PrepareSettings& options,
                     std::vector<double> scales = {});
 
-  /// Calls prepare(watcher), and meanwhile decides about the clouds whose surfaces the watcher
-  /// gets, where a device leaves the host idle. Elsewhere the watcher is empty.
-  void during(const std::function<void(const SurfaceWatcher& watcher)>& prepare);
+  /// Prepares the clouds [begin, end) as far as the sides that input or origin give. Where a device
+  /// leaves the host idle, the host meanwhile decides about those whose surfaces are there.
+  std::vector<std::shared_ptr<PreparedState>> prepare(std::size_t begin, std::size_t end);
 
   /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others
   /// than the preparation took are replaced: prepared again from their prepared points, with the
@@ -69,6 +71,8 @@ class UnknownViewpoints {
                      const std::vector<std::size_t>& copies);
   void set_statistics(std::size_t cloud, PrepareStatistics& statistics) const;
   void prepare_again(std::vector<std::shared_ptr<PreparedState>>& states);
+  /// Works on a thread of its own, after all works before.
+  void meanwhile(std::function<void()> work);
   ThreadGroup& threads();
 
   Engine& engine_;
@@ -79,6 +83,8 @@ class UnknownViewpoints {
   std::vector<std::optional<SpacingSpread>> spread_;  ///< of each cloud, once measured
   std::vector<Decision> decisions_;                   ///< about each cloud
   std::unique_ptr<ThreadGroup> threads_;
+  std::mutex mutex_;
+  std::future<void> early_;  ///< last: it is waited for before the other members end
 };
 
 }  // namespace gpureg

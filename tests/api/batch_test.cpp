@@ -34,7 +34,8 @@ class IdleHostEngine final : public Engine {
   const void* memory() const override { return cpu_->memory(); }
   std::size_t pairs_per_chunk(const RegistrationSettings&) const override { return chunk_; }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareSettings& options) override {
+                                                      const PrepareSettings& options,
+                                                      const SurfaceWatcher&) override {
     return cpu_->prepare(clouds, options);
   }
   void align(Span<const PairInput> pairs, const RegistrationSettings& options,

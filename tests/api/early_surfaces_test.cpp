@@ -28,13 +28,10 @@ class WatchedEngine final : public Engine {
   const void* memory() const override { return cpu_->memory(); }
   std::size_t pairs_per_chunk(const RegistrationSettings&) const override { return 8; }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareSettings& options) override {
-    return cpu_->prepare(clouds, options);
-  }
-  std::vector<std::shared_ptr<PreparedState>> prepare_watched(
-      Span<const RawCloud> clouds, const PrepareSettings& options,
-      const SurfaceWatcher& watcher) override {
+                                                      const PrepareSettings& options,
+                                                      const SurfaceWatcher& watcher) override {
     auto states = cpu_->prepare(clouds, options);
+    if (!watcher) return states;
     for (std::size_t k = 0; k < states.size(); k += stride_) {
       EarlySurface surface;
       static_cast<PointsAndNormals&>(surface) = states[k]->copy_points_and_normals();

@@ -28,7 +28,8 @@ class LimitedEngine final : public Engine {
   const void* memory() const override { return cpu_->memory(); }
   std::size_t pairs_per_chunk(const RegistrationSettings&) const override { return 100; }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareSettings& options) override {
+                                                      const PrepareSettings& options,
+                                                      const SurfaceWatcher&) override {
     check(clouds.size);
     return cpu_->prepare(clouds, options);
   }

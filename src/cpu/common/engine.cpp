@@ -37,7 +37,8 @@ class CpuEngine final : public Engine {
   }
 
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
-                                                      const PrepareSettings& options) override {
+                                                      const PrepareSettings& options,
+                                                      const SurfaceWatcher&) override {
     std::lock_guard<std::mutex> lock(mutex_);
     auto prepared = pipeline::prepare(exec_, clouds, options);
     for (auto& cloud : prepared) cloud->owner = &kHostMemory;
