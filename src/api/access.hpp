@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "gpureg/context.hpp"
 #include "gpureg/prepared_cloud.hpp"
@@ -20,6 +21,11 @@ struct Access {
   }
   static PreparedCloud cloud(std::shared_ptr<const PreparedState> state) {
     return PreparedCloud(std::move(state));
+  }
+  static std::vector<PreparedCloud> clouds(std::vector<std::shared_ptr<PreparedState>>&& states) {
+    std::vector<PreparedCloud> out;
+    for (auto& state : states) out.push_back(cloud(std::move(state)));
+    return out;
   }
 };
 

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "api/access.hpp"
 #include "api/frames.hpp"
 #include "api/prior.hpp"
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
 #include "flat/planar_pose.hpp"
+#include "gpureg/registration.hpp"
 #include "sensor_fixed/common_view.hpp"
 
 namespace gpureg {
@@ -94,5 +96,23 @@ struct AlignedPair {
     return confidence::ranking_of(poses, source, target);
   }
 };
+
+/// One way to take the sides of both clouds of a pair.
+struct PairVariant {
+  std::size_t pair;  ///< index into the pairs
+  AlignedPair clouds;
+};
+
+/// Each pair with each of the sides of its clouds. The variants of a pair are neighbours.
+inline std::vector<PairVariant> variants_of(const std::vector<PreparedCloud>& clouds,
+                                            const std::vector<Pair>& pairs,
+                                            const RegistrationSettings& options) {
+  std::vector<PairVariant> out;
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    for (const PreparedState* s : Access::state(clouds[pairs[p].source])->with_sides())
+      for (const PreparedState* t : Access::state(clouds[pairs[p].target])->with_sides())
+        out.push_back({p, {*s, *t, options}});
+  return out;
+}
 
 }  // namespace gpureg

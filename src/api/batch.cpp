@@ -11,6 +11,25 @@
 #include "common/stop_scope.hpp"
 
 namespace gpureg {
+namespace {
+
+/// Keeps the result with the higher confidence, up to a symmetry, the first one of equals, and the
+/// time of both.
+void keep_better(RegistrationResult&& candidate, RegistrationResult& kept) {
+  const bool first = kept.status == RegistrationStatus::skipped;
+  StageTimings sum = candidate.timings;
+  sum += kept.timings;
+  const auto better = [&] {
+    if (candidate.has_pose() != kept.has_pose()) return candidate.has_pose();
+    const double together = candidate.symmetry_confidence(), before = kept.symmetry_confidence();
+    if (together != before) return together > before;
+    return candidate.confidence > kept.confidence;
+  };
+  if (first || better()) kept = std::move(candidate);
+  kept.timings = sum;
+}
+
+}  // namespace
 
 Batch::Batch(Engine& engine, const std::vector<PairVariant>& variants,
              const std::vector<RegistrationPrior>& priors, const RegistrationSettings& options,
@@ -40,15 +59,14 @@ Batch::Chunk Batch::next_chunk() {
   const RegistrationPrior nothing;
   for (; next_ < end; ++next_) {
     const PairVariant& v = variants_[next_];
-    const AlignedPair& pair = out.pairs.emplace_back(*v.source, *v.target, options_);
     const RegistrationPrior& prior = priors_.empty() ? nothing : priors_[v.pair];
-    out.inputs.push_back(pair.input(prior));
+    out.inputs.push_back(v.clouds.input(prior));
     if (!prior.correspondences) continue;
     // The other sides of a cloud have its points in its order.
     std::vector<std::uint32_t> source, target;
     for (const Correspondence& c : *prior.correspondences) {
-      source.push_back(pair.swapped ? c.target : c.source);
-      target.push_back(pair.swapped ? c.source : c.target);
+      source.push_back(v.clouds.swapped ? c.target : c.source);
+      target.push_back(v.clouds.swapped ? c.source : c.target);
     }
     out.inputs.back().custom_source = span_of(source);
     out.inputs.back().custom_target = span_of(target);
@@ -87,7 +105,8 @@ void Batch::conclude(Chunk& chunk) {
   // take one pair after the other.
   const std::size_t workers = std::min<std::size_t>(engine_.host_threads(), 1 + chunk.size() / 16);
   for_each_on(workers, chunk.size(), [&](std::size_t k) {
-    found[k] = to_result(std::move(chunk.outcomes[k]), chunk.pairs[k], chunk.inputs[k].prior);
+    found[k] = to_result(std::move(chunk.outcomes[k]), variants_[chunk.first + k].clouds,
+                         chunk.inputs[k].prior);
   });
   for (std::size_t k = 0; k < chunk.size(); ++k) {
     const std::size_t variant = chunk.first + k, pair = variants_[variant].pair;

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "api/aligned_pair.hpp"
-#include "api/variants.hpp"
 #include "pipeline/engine.hpp"
 
 namespace gpureg {
@@ -27,7 +26,6 @@ class Batch {
  private:
   struct Chunk {
     std::size_t first = 0;  ///< of its variants, which are all those of its pairs
-    std::vector<AlignedPair> pairs;
     std::vector<PairInput> inputs;
     std::vector<PairOutcome> outcomes;
     std::vector<std::vector<std::uint32_t>> given;  ///< indices of correspondences, for inputs

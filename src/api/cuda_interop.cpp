@@ -7,7 +7,6 @@
 #include "api/access.hpp"
 #include "api/name_cloud.hpp"
 #include "api/raw_cloud.hpp"
-#include "common/in_halves.hpp"
 #include "pipeline/device_engine.hpp"
 #include "settings/resolve.hpp"
 #include "viewpoint/unknown_viewpoint.hpp"
@@ -57,12 +56,18 @@ AdoptedBatch adopt(const Context& context, const std::vector<DevicePointCloudVie
   return out;
 }
 
-/// Decides about unknown viewpoints, from host copies of the points where they are asked for.
-void resolve(const AdoptedBatch& batch, std::vector<std::shared_ptr<PreparedState>>& states) {
-  std::vector<std::vector<float>> rows(states.size());
-  std::vector<RawCloud> raw(states.size());
-  for (std::size_t k = 0; k < states.size(); ++k) {
+/// The clouds' sides are decided from host copies of the points where they are asked for.
+std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
+  const std::size_t all = batch.clouds.size();
+  auto states = prepare_named(batch.names, all, [&](std::size_t begin, std::size_t end) {
+    return batch.engine->prepare_adopted({batch.clouds.data() + begin, end - begin}, batch.options);
+  });
+  std::vector<std::vector<float>> rows(all);
+  std::vector<RawCloud> raw(all);
+  for (std::size_t k = 0; k < all; ++k) {
     const CloudKnowledge& known = batch.knowledge[k];
+    std::copy(batch.origins[k].begin(), batch.origins[k].end(), states[k]->frame_offset);
+    naming_cloud(batch.names, all, k, [&] { check_viewpoints(known, *states[k]); });
     if (!known.viewpoints && !known.normals && batch.options.depth_maps > 0)
       rows[k] = batch.engine->copy_points(*batch.clouds[k]);
     raw[k].points = rows[k].data();
@@ -70,29 +75,7 @@ void resolve(const AdoptedBatch& batch, std::vector<std::shared_ptr<PreparedStat
     raw[k].point_stride = 3;
   }
   UnknownViewpoints(*batch.engine, span_of(raw), batch.knowledge, batch.options).resolve(states);
-}
-
-std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
-  std::vector<std::shared_ptr<PreparedState>> states;
-  in_halves(0, batch.clouds.size(), [&](std::size_t begin, std::size_t end) {
-    const auto work = [&] {
-      return batch.engine->prepare_adopted({batch.clouds.data() + begin, end - begin},
-                                           batch.options);
-    };
-    const std::size_t all = batch.clouds.size();
-    for (auto& state : end - begin == 1 ? naming_cloud(batch.names, all, begin, work) : work()) {
-      const std::array<double, 3>& origin = batch.origins[states.size()];
-      std::copy(origin.begin(), origin.end(), state->frame_offset);
-      states.push_back(std::move(state));
-    }
-  });
-  for (std::size_t k = 0; k < states.size(); ++k)
-    naming_cloud(batch.names, states.size(), k,
-                 [&] { check_viewpoints(batch.knowledge[k], *states[k]); });
-  resolve(batch, states);
-  std::vector<PreparedCloud> out;
-  for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
-  return out;
+  return Access::clouds(std::move(states));
 }
 
 }  // namespace

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <iterator>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "gpureg/error.hpp"
+#include "common/in_halves.hpp"
+#include "pipeline/prepared_state.hpp"
 
 namespace gpureg {
 
@@ -27,6 +31,21 @@ auto naming_cloud(const std::vector<std::string>& names, std::size_t clouds, std
     throw InvalidArgument((names.empty() ? "clouds[" + std::to_string(k) + "]" : names[k]) + ": " +
                           error.what());
   }
+}
+
+/// Prepares the clouds of a batch by prepare(begin, end), in halves where they do not fit together.
+/// The error of a cloud names it.
+template <typename Prepare>
+std::vector<std::shared_ptr<PreparedState>> prepare_named(const std::vector<std::string>& names,
+                                                          std::size_t clouds,
+                                                          const Prepare& prepare) {
+  std::vector<std::shared_ptr<PreparedState>> out;
+  in_halves(0, clouds, [&](std::size_t begin, std::size_t end) {
+    const auto work = [&] { return prepare(begin, end); };
+    auto made = end - begin == 1 ? naming_cloud(names, clouds, begin, work) : work();
+    std::move(made.begin(), made.end(), std::back_inserter(out));
+  });
+  return out;
 }
 
 }  // namespace gpureg

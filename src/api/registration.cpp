@@ -1,27 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/registration.hpp"
 
-#include <algorithm>
-#include <optional>
 #include <string>
 
 #include "api/access.hpp"
 #include "api/batch.hpp"
+#include "api/engine_rows.hpp"
 #include "api/name_cloud.hpp"
 #include "api/pair_input.hpp"
 #include "api/raw_cloud.hpp"
-#include "api/variants.hpp"
 #include "api/with_settings.hpp"
-#include "common/host_threads.hpp"
-#include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
-#include "flat/extruded.hpp"
 #include "gpureg/voxel_size.hpp"
-#include "sensor_fixed/known.hpp"
-#include "sensor_fixed/range_shells.hpp"
-#include "spacing/stray_points.hpp"
-#include "viewpoint/unknown_viewpoint.hpp"
 
 namespace gpureg {
 namespace {
@@ -63,54 +54,9 @@ std::vector<RegistrationResult> align_all_pairs(
                 several ? "priors[" + std::to_string(p) + "]" : "prior",
                 *Access::state(clouds[pairs[p].source]), *Access::state(clouds[pairs[p].target]),
                 options);
-  const std::vector<PairVariant> variants = variants_of(clouds, pairs);
+  const std::vector<PairVariant> variants = variants_of(clouds, pairs, options);
   Batch batch(*Access::engine(context), variants, priors, options, callbacks, pairs.size());
   return batch.run();
-}
-
-/// Points from which another thread is worth its start.
-constexpr std::size_t kRawPointsPerThread = 200'000;
-
-/// The owners of the rows that the engine gets of a cloud.
-struct OwnedRows {
-  WithoutRangeShells seen;
-  Extruded extruded;
-  WithoutStrayPoints kept;
-  OwnedRows(const RawCloud& raw, const CloudKnowledge& known, const PrepareSettings& options)
-      : seen(raw, options.keep_range_limits || !has_sensor_frame(known)),
-        extruded(seen.cloud(), known.model, options),
-        kept(extruded.cloud(), options) {}
-  OwnedRows(const OwnedRows&) = delete;
-  OwnedRows& operator=(const OwnedRows&) = delete;
-};
-
-/// Replaces clouds by those that the engine gets: without points at the limits of the range, 2-D
-/// scans in layers, without stray points.
-/// @return the owners of the rows.
-template <typename Naming>
-std::vector<std::optional<OwnedRows>> replace_rows(const Engine& engine,
-                                                   const PrepareSettings& options,
-                                                   const Naming& naming,
-                                                   std::vector<CloudKnowledge>& knowledge,
-                                                   std::vector<RawCloud>& raw) {
-  std::vector<std::optional<OwnedRows>> owners(raw.size());
-  std::size_t points = 0;
-  for (const RawCloud& cloud : raw) points += cloud.size;
-  const std::size_t workers = std::min<std::size_t>(
-      {std::max(1u, engine.host_threads()), raw.size(), 1 + points / kRawPointsPerThread});
-  on_threads(workers, [&](std::size_t worker) {
-    for (std::size_t k = worker; k < raw.size(); k += workers)
-      naming(k, [&] {
-        const OwnedRows& rows = owners[k].emplace(raw[k], knowledge[k], options);
-        raw[k] = rows.kept.cloud();
-        knowledge[k].flat = rows.extruded.plane().exists();
-        // The origin of the frame may be below the scanner.
-        if (knowledge[k].flat && !knowledge[k].viewpoints && raw[k].viewpoints)
-          for (int axis = 0; axis < 3; ++axis)
-            knowledge[k].origin[axis] = -static_cast<double>(raw[k].viewpoints[axis]);
-      });
-  });
-  return owners;
 }
 
 /// @param scales of copies of one cloud that are for matches alone, or none.
@@ -121,45 +67,31 @@ std::vector<PreparedCloud> prepare_all(const Context& context,
                                        const std::vector<double>& scales) {
   options.validate();
   check_names(names, clouds.size());
-  const auto naming = [&](std::size_t k, auto&& action) {
+  Engine& engine = *Access::engine(context);
+  const auto naming = [&](std::size_t k, const auto& action) {
     return naming_cloud(names, clouds.size(), k, action);
   };
-  std::vector<RawCloud> raw;
-  raw.reserve(clouds.size());
+  std::vector<RawCloud> raw(clouds.size());
   std::vector<FrameOrigin> frame_origins(clouds.size());
   std::vector<CloudKnowledge> knowledge;
   for (std::size_t k = 0; k < clouds.size(); ++k) {
-    raw.push_back(naming(k, [&] {
-      const RawCloud cloud = raw_cloud(clouds[k]);
-      Access::engine(context)->check_on_host(cloud);
-      return cloud;
-    }));
-    raw.back().matched_only = !scales.empty();
+    naming(k, [&] { engine.check_on_host(raw[k] = raw_cloud(clouds[k])); });
+    raw[k].matched_only = !scales.empty();
     knowledge.push_back(knowledge_of(clouds[k]));
-    view_from_frame_origin(clouds[k].origin, frame_origins[k], raw.back());
+    view_from_frame_origin(clouds[k].origin, frame_origins[k], raw[k]);
   }
-  std::vector<PreparedCloud> out;
-  if (raw.empty()) return out;
-  const auto owners = replace_rows(*Access::engine(context), options, naming, knowledge, raw);
-  UnknownViewpoints unknown(*Access::engine(context), span_of(raw), knowledge, options, scales);
-  std::vector<std::shared_ptr<PreparedState>> states;
-  in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
-    const auto work = [&] { return unknown.prepare(begin, end); };
-    for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
-      set_frame_offset(clouds[states.size()].origin, *state);
-      const OwnedRows& rows = *owners[states.size()];
-      state->plane = rows.extruded.plane();
-      rows.kept.count(state->statistics);
-      rows.extruded.count(state->statistics);
-      rows.seen.count(state->statistics);
-      states.push_back(std::move(state));
-    }
+  const auto rows = replace_rows(engine, options, naming, knowledge, raw);
+  UnknownViewpoints sides(engine, span_of(raw), knowledge, options, scales);
+  auto states = prepare_named(names, raw.size(), [&](std::size_t begin, std::size_t end) {
+    return sides.prepare(begin, end);
   });
-  for (std::size_t k = 0; k < states.size(); ++k)
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    set_frame_offset(clouds[k].origin, *states[k]);
+    rows[k]->describe(*states[k]);
     naming(k, [&] { check_viewpoints(knowledge[k], *states[k]); });
-  unknown.resolve(states);
-  for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
-  return out;
+  }
+  sides.resolve(states);
+  return Access::clouds(std::move(states));
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include "api/engine_calls.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
-#include "api/variants.hpp"
 #include "api/verify_by_surfaces.hpp"
 #include "api/with_settings.hpp"
 #include "common/for_each_on.hpp"
@@ -20,8 +19,6 @@ namespace {
 
 /// One pair whose poses are verified.
 struct VerifiedPair : AlignedPair {
-  using AlignedPair::AlignedPair;
-
   PoseVerification verification_of(const ModeOutcome& mode, const PoseEvidence& evidence) const {
     PoseVerification out;
     out.target_from_source = transform_of(mode.pose);
@@ -149,7 +146,7 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
   RegistrationSettings by_evidence = options;
   by_evidence.method = RegistrationMethod::compatibility;
   Verifications results(pairs.size());
-  const std::vector<PairVariant> variants = variants_of(clouds, pairs);
+  const std::vector<PairVariant> variants = variants_of(clouds, pairs, by_evidence);
   const std::size_t chunk = engine.pairs_per_chunk(by_evidence);
   for (std::size_t begin = 0; begin < variants.size(); begin += chunk) {
     StopScope::poll();
@@ -158,8 +155,8 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
     std::vector<VerifiedPair> verified;
     std::vector<std::vector<Pose<double>>> local(end - begin);
     for (std::size_t v = begin; v < end; ++v) {
-      const VerifiedPair& pair =
-          verified.emplace_back(*variants[v].source, *variants[v].target, by_evidence);
+      const VerifiedPair pair{variants[v].clouds};
+      verified.push_back(pair);
       inputs.push_back(pair.input());
       if (pair.source.size > 0 && pair.target.size > 0)
         inputs.back().custom_source = inputs.back().custom_target = matches;

@@ -22,18 +22,8 @@ struct EarlySurface : PointsAndNormals {
 /// tried again may give those of a cloud twice, from several threads; they are equal.
 using SurfaceWatcher = std::function<void(std::size_t first, std::vector<EarlySurface> surfaces)>;
 
-/// Content of a PreparedCloud: metadata on the host, data in the memory of its engine.
-struct PreparedState {
-  virtual ~PreparedState() = default;
-  /// Host copies, relative to the local origin.
-  virtual std::vector<Vec3> copy_points() const = 0;
-  virtual std::vector<Vec3> copy_normals() const = 0;
-  virtual std::vector<float> copy_features() const = 0;
-  /// With one wait where they are on a device.
-  virtual PointsAndNormals copy_points_and_normals() const {
-    return {copy_points(), copy_normals()};
-  }
-
+/// What the host knows of a prepared cloud.
+struct PreparedFacts {
   /// Identifies the memory that holds the data: clouds of one owner can be aligned.
   const void* owner = nullptr;
   PrepareSettings options;
@@ -47,8 +37,27 @@ struct PreparedState {
   std::uint64_t normal_weight_total = 0;  ///< see CloudView
   float radius = 1;                       ///< see CloudView
   std::vector<Vec3> viewpoints;           ///< relative to the local origin
+};
+
+/// Content of a PreparedCloud: facts on the host, data in the memory of its engine.
+struct PreparedState : PreparedFacts {
+  virtual ~PreparedState() = default;
+  /// Host copies, relative to the local origin.
+  virtual std::vector<Vec3> copy_points() const = 0;
+  virtual std::vector<Vec3> copy_normals() const = 0;
+  virtual std::vector<float> copy_features() const = 0;
+  /// With one wait where they are on a device.
+  virtual PointsAndNormals copy_points_and_normals() const {
+    return {copy_points(), copy_normals()};
+  }
+
   /// The same cloud with the other sides of its surfaces, where nobody knows them; else null.
   std::shared_ptr<PreparedState> other_sides;
+  /// The cloud with each of its one or two sides.
+  std::vector<const PreparedState*> with_sides() const {
+    if (!other_sides) return {this};
+    return {this, other_sides.get()};
+  }
 };
 
 /// Whether both clouds are scans of 2-D scanners: the pose is planar.
