@@ -70,7 +70,6 @@ class UnknownViewpoints {
   void decide_copies(const std::vector<std::shared_ptr<PreparedState>>& states,
                      const std::vector<std::size_t>& copies);
   void set_statistics(std::size_t cloud, PrepareStatistics& statistics) const;
-  void prepare_again(std::vector<std::shared_ptr<PreparedState>>& states);
   /// Works on a thread of its own, after all works before.
   void meanwhile(std::function<void()> work);
   ThreadGroup& threads();
