@@ -202,7 +202,7 @@ class Map:
 
     @property
     def agreement(self) -> tuple[float, float, float]:
-        """What `places_look_alike` is decided by: the share of the confidence of all pairs that
+        """What `places_look_alike` is decided by: the share of the evidence of all pairs that
         contradicts the others, the pairs that agree for each scan, and the share of long steps
         between scans of consecutive numbers.
         """

@@ -9,6 +9,7 @@
 #include "fields/reconstruction.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "math/exponential.hpp"
 #include "reconstruction/connections.hpp"
 #include "reconstruction/edge_noise.hpp"
 #include "reconstruction/odometry.hpp"
@@ -156,8 +157,10 @@ Agreement agreement_of(const std::vector<Edge>& edges) {
   double all = 0, contradicted = 0;
   std::set<std::uint32_t> scans;
   for (const Edge& edge : edges) {
-    all += edge.pair_confidence;
-    if (!edge.accepted) contradicted += edge.pair_confidence;
+    // How surprising it would be that the pair is wrong. It is at most kCertain.
+    const double evidence = -portable::log(1 - edge.pair_confidence);
+    all += evidence;
+    if (!edge.accepted) contradicted += evidence;
     out.edges_per_scan += edge.accepted;
     scans.insert({edge.source, edge.target});
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "pose_graph/se3.hpp"
 #include "reconstruction/edge_noise.hpp"
 #include "reconstruction/pair_results.hpp"
@@ -36,7 +38,8 @@ TEST(Reconstruct, RejectsFalsePairs) {
   EXPECT_EQ(map.placed(), 12u);
   EXPECT_LT(largest_error(map, data.world_from_scan, 0), kTolerance);
   for (const auto& edge : map.edges) EXPECT_EQ(edge.accepted, edge.source - edge.target <= 3);
-  EXPECT_NEAR(map.agreement.contradicted, 2 * 0.9 / (30 * 0.95 + 2 * 0.9), 1e-9);
+  EXPECT_NEAR(map.agreement.contradicted,
+              2 * std::log(0.1) / (30 * std::log(0.05) + 2 * std::log(0.1)), 1e-9);
   EXPECT_DOUBLE_EQ(map.agreement.edges_per_scan, 30.0 / 12);
 }
 

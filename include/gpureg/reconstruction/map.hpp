@@ -138,8 +138,8 @@ struct Island {
 
 /// How far the pairs of a set agree, before connections that are too weak are cut.
 struct Agreement {
-  /// Of the confidence of all edges, each by its pair alone, the share of edges that contradict the
-  /// others.
+  /// Of the evidence of all edges, -log(1 - pair_confidence), the share of edges that contradict
+  /// the others.
   double contradicted = 0;
   double edges_per_scan = 0;  ///< edges that agree, for each scan that has an edge
   /// Share of the steps between scans of consecutive numbers that are longer than steps of
