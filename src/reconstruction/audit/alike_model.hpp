@@ -8,13 +8,14 @@
 
 namespace gpureg::reconstruction {
 
-/// Log odds that places of a set look alike, so that pairs that agree may be wrong together. Pairs
-/// of distinct places contradict each other the less the more pairs a scan has, as loops choose the
-/// right poses. Written by bench/accuracy/fit_alike.py.
+/// Log odds that places of a set look alike, so that pairs that agree may be wrong together. Where
+/// places differ, the share that contradicts falls with the square of the edges per scan, as loops
+/// choose the right poses. The constants are written by bench/accuracy/fit_alike.py.
 inline double alike_log_odds(const Agreement& agreement) {
-  constexpr double kBias = 2.4, kContradicted = 3, kEdgesPerScan = 6, kJumps = 10;
-  return kBias + kContradicted * portable::log(std::max(agreement.contradicted, 1e-3)) +
-         kEdgesPerScan * portable::log(std::max(agreement.edges_per_scan, 0.1)) +
+  constexpr double kBias = 0.8, kContradicted = 2, kJumps = 18;
+  const double edges = std::max(agreement.edges_per_scan, 0.1);
+  return kBias +
+         kContradicted * portable::log(std::max(agreement.contradicted, 1e-3) * edges * edges) +
          kJumps * agreement.jumps;
 }
 
