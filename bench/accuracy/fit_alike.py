@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Do places of a set look alike? Log odds by how far its pairs agree (Reconstruction::agreement).
 
-Sets: all scans of a scene, halves, thirds, random two thirds and halves. Places look alike where more than
-a tenth of the poses from a confidence of one half on are wrong. Logistic regression, each kind of place with
-the same weight; it prints the sets that a fit on the other kinds gets wrong.
+Sets: all scans of a scene, halves, thirds, random two thirds and halves. Places of a scene look alike if more
+than a tenth of the poses from a confidence of one half on are wrong. Logistic regression: distinct places and
+alike ones, and of each the kinds, have the same weight, a set that of its poses. It prints how many sets, and
+poses, a fit on the other kinds calls alike.
 
     fit_alike.py --gather ROWS.json KIND=SCENE_FOLDER ... [--backend cuda]    adds rows
     fit_alike.py ROWS.json [--write]    (src/reconstruction/audit/alike_model.hpp)
@@ -26,7 +27,7 @@ HEADER = pathlib.Path(__file__).resolve().parents[2] / "src/reconstruction/audit
 VOXEL = 0.05
 WRONG = 0.35, 8  # metres, degrees
 REPORTED, ALIKE = 0.5, 0.1
-PENALTY = 1e-3
+PENALTY = 1e-4
 
 
 def subsets(scans):
@@ -108,20 +109,25 @@ def features(rows):
     return np.column_stack([np.ones(len(rows)), np.log(q), [r["jumps"] for r in rows]])
 
 
-def looks_alike(row):
-    return row["wrong"] > ALIKE * row["reported"]
+def alike_scenes(rows):
+    return {r["scene"] for r in rows if r["subset"] == "all" and r["wrong"] > ALIKE * r["reported"]}
 
 
 def fit(rows):
-    x, y = features(rows), np.where([looks_alike(r) for r in rows], 1.0, -1.0)
-    count = collections.Counter(r["kind"] for r in rows)
-    weight = np.array([1 / count[r["kind"]] for r in rows])
-    weight /= weight.sum()
+    alike = alike_scenes(rows)
+    x, y = features(rows), np.array([1.0 if r["scene"] in alike else -1.0 for r in rows])
+    poses, kinds = collections.Counter(), {1: set(), -1: set()}
+    for row, label in zip(rows, y):
+        poses[row["kind"], label] += row["reported"]
+        kinds[label].add(row["kind"])
+    weight = np.array(
+        [r["reported"] / poses[r["kind"], k] / len(kinds[k]) for r, k in zip(rows, y)]
+    )
 
     def loss(p):
         margin = y * (x @ p)
-        slope = -weight * y / (1 + np.exp(margin))
-        return (weight * np.logaddexp(0, -margin)).sum() + PENALTY * (p[1:] ** 2).sum() / 2, (
+        slope = -weight * y / (1 + np.exp(margin)) / 2
+        return (weight * np.logaddexp(0, -margin)).sum() / 2 + PENALTY * (p[1:] ** 2).sum() / 2, (
             x.T @ slope + PENALTY * np.r_[0, p[1:]]
         )
 
@@ -141,16 +147,16 @@ def main():
     if arguments.gather:
         return gather(arguments.rows, arguments.places, arguments.backend)
     rows = json.loads(arguments.rows.read_text())
+    alike = alike_scenes(rows)
     for kind in dict.fromkeys(r["kind"] for r in rows):
         p = fit([r for r in rows if r["kind"] != kind])
         own = [r for r in rows if r["kind"] == kind]
-        for alike in (True, False):
-            of = [r for r in own if looks_alike(r) == alike]
-            found = sum(features([r])[0] @ p > 0 for r in of)
-            if of:
-                print(
-                    f"{kind:20} {'alike' if alike else 'distinct':9} called alike: {found} of {len(of)}"
-                )
+        called = [r for r in own if features([r])[0] @ p > 0]
+        share = sum(r["reported"] for r in called) / sum(r["reported"] for r in own)
+        print(
+            f"{kind:12} {'alike' if own[0]['scene'] in alike else 'distinct':9} called alike: "
+            f"{len(called)} of {len(own)}, {100 * share:.0f} % of the poses"
+        )
     p = fit(rows)
     print("bias, contradicted, jumps:", *p.round(3))
     if arguments.write:
