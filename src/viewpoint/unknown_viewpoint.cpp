@@ -76,10 +76,21 @@ void UnknownViewpoints::measure_rows(std::size_t cloud) {
 
 void UnknownViewpoints::meanwhile(std::function<void()> work) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  early_ = std::async([before = std::move(early_), work = std::move(work)]() mutable {
-    if (before.valid()) before.get();
-    work();
+  waiting_.push_back(std::move(work));
+  if (working_) return;
+  working_ = true;  // also after a failure: what waits then is not begun
+  early_ = std::async(std::launch::async, [this] {
+    while (const std::function<void()> next = next_work()) next();
   });
+}
+
+std::function<void()> UnknownViewpoints::next_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  working_ = !waiting_.empty();
+  if (!working_) return nullptr;
+  std::function<void()> out = std::move(waiting_.front());
+  waiting_.pop_front();
+  return out;
 }
 
 std::vector<std::shared_ptr<PreparedState>> UnknownViewpoints::prepare(std::size_t begin,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <future>
 #include <memory>
@@ -70,8 +71,9 @@ class UnknownViewpoints {
   void decide_copies(const std::vector<std::shared_ptr<PreparedState>>& states,
                      const std::vector<std::size_t>& copies);
   void set_statistics(std::size_t cloud, PrepareStatistics& statistics) const;
-  /// Works on a thread of its own, after all works before.
+  /// Works on another thread, after all works before.
   void meanwhile(std::function<void()> work);
+  std::function<void()> next_work();
   ThreadGroup& threads();
 
   Engine& engine_;
@@ -83,6 +85,8 @@ class UnknownViewpoints {
   std::vector<Decision> decisions_;                   ///< about each cloud
   std::unique_ptr<ThreadGroup> threads_;
   std::mutex mutex_;
+  std::deque<std::function<void()>> waiting_;
+  bool working_ = false;
   std::future<void> early_;  ///< last: it is waited for before the other members end
 };
 
