@@ -6,7 +6,9 @@ Prints what fits that have not seen a kind of part make of it."""
 import argparse
 import json
 import pathlib
+import re
 import sys
+import typing
 
 import numpy as np
 
@@ -40,7 +42,35 @@ UNSEEN = {
 }
 
 
+DEPENDENT = 2  # as part_confidence.cpp
+
+
+def at_least(share, count):
+    """What a share of so many trials is at least, one standard deviation down (Wilson)."""
+    if not count > 0:
+        return 0.0
+    half = 0.5 / count
+    return max(
+        0.0, (share + half - (share * (1 - share) / count + half * half) ** 0.5) / (1 + 2 * half)
+    )
+
+
+class Shipped(typing.NamedTuple):
+    bias: float
+    steps: list
+
+
 def features(evidence):
+    e = dict(evidence)
+    edge = DEPENDENT * e["cell"]
+    cells = e["area"] / e["supported"] / edge**2 if e["supported"] > 0 and edge > 0 else 0
+    outline = e["contour_length"] / edge if edge > 0 else 0
+    evidence = {
+        **e,
+        "supported": at_least(e["supported"], cells),
+        "violated": 1 - at_least(1 - e["violated"], cells),
+        "contour": at_least(e["contour"], outline),
+    }
     return [
         np.log(max(evidence[n.removeprefix("log_")], LEAST))
         if n.startswith("log_")
@@ -145,9 +175,23 @@ def header(models, note):
     return "\n".join([*lines, "}  // namespace gpureg::localization", ""])
 
 
+def shipped(name):
+    """The model of the header."""
+    text = HEADER.read_text()
+    steps = re.findall(
+        r"\{PartFeature::(\w+), (.+?), (.+?), (.+?)\}",
+        text.split(f"{name}Steps[]")[1].split(";")[0],
+        re.S,
+    )
+    bias = float(re.search(rf"PartModel {name}\{{(.+?),", text)[1])
+    names = list(SIGNS)
+    return Shipped(bias, [(names.index(f), *map(float, numbers)) for f, *numbers in steps])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("records", nargs="+")
+    parser.add_argument("--tested", help="write the rows, each scored by a fit on the other kinds")
     parser.add_argument("--write", action="store_true", help=f"write {HEADER.relative_to(ROOT)}")
     arguments = parser.parse_args()
     rows = [
@@ -159,7 +203,8 @@ def main():
     for name, view in (("kInView", True), ("kUnseen", False)):
         of = [r for r in rows if r["view"] == view]
         if not of:
-            print(f"no record for {name}")
+            print(f"no record for {name}: it stays as it is")
+            models[name] = shipped(name)
             continue
         print(
             f"== {'seen from a known viewpoint' if view else 'viewpoint not known'}: kinds that the fit has not seen"
@@ -167,6 +212,12 @@ def main():
         tested = unseen_kinds(of)
         print_table(tested)
         print_calibration(tested)
+        if arguments.tested and view:
+            pathlib.Path(arguments.tested).write_text(
+                "".join(
+                    json.dumps({**r, "fit": "of fits on the other kinds"}) + "\n" for r in tested
+                )
+            )
         models[name] = fitted(of)
         for k, a, b, rise in models[name].steps:
             print(f"  {list(SIGNS)[k]} {a:.3f} .. {b:.3f}: {rise:+.2f}")

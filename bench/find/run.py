@@ -13,14 +13,19 @@ import time
 
 import numpy as np
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent))
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(pathlib.Path(__file__).parent), str(ROOT / "bench/accuracy")]
 import parts as shapes
 import scenes
+from record import commit, save
+
+RECORD = ROOT / "bench/results/find.json"
 
 CLOSE, INLIERS, VISIBLE = 0.05, 0.98, 0.4
 COUNTS = (0, 1, 5, 20)
 CLUTTER = 6
 PRECISION = 0.95
+PART_POINTS = 20000
 
 
 def read_stl(path):
@@ -95,13 +100,18 @@ def scene_of(kind, seed, count, data):
 
 def row_of(gpureg, context, arguments, kind, seed, count):
     triangles, diameter, points, truth = scene_of(kind, seed, count, arguments.data)
-    surface, normals = shapes.sample(triangles, 20000, np.random.default_rng(1))
-    options = gpureg.FindOptions(min_confidence=0, quality=arguments.quality, seed=seed)
+    surface, normals = shapes.sample(triangles, arguments.part_points, np.random.default_rng(1))
+    options = gpureg.FindOptions(
+        min_confidence=0,
+        quality=arguments.quality,
+        seed=seed,
+        voxel_size=arguments.voxel * diameter,
+    )
     begin = time.perf_counter()
     result = gpureg.find(
         surface,
         points,
-        part_normals=normals,
+        part_normals=None if arguments.scan else normals,
         options=options,
         context=context,
         scene_viewpoints="none" if arguments.unseen else np.zeros(3),
@@ -125,8 +135,12 @@ def row_of(gpureg, context, arguments, kind, seed, count):
         "seed": seed,
         "count": count,
         "view": not arguments.unseen,
+        "part_points": arguments.part_points,
+        "scan": arguments.scan,
+        "voxel": result.voxel_size / result.diameter,
         "seconds": seconds,
         "device": context.description,
+        "commit": commit(),
         "quality": arguments.quality,
         "visible": [round(float(s), 4) for _, s in truth],
         "found": found,
@@ -134,28 +148,31 @@ def row_of(gpureg, context, arguments, kind, seed, count):
 
 
 def opencv_row(arguments, kind, seed, count):
-    """Point pair features of OpenCV (surface_matching, Drost et al. 2010), refined by its ICP."""
+    """Point pair features of OpenCV (surface_matching, Drost et al. 2010). Without its ICP, which moves right poses away in
+    a bin: it draws every side of the part to the scene."""
     import cv2
 
     triangles, diameter, points, truth = scene_of(kind, seed, count, arguments.data)
     surface, normals = shapes.sample(triangles, 4000, np.random.default_rng(1))
+    # In diameters: the detector joins poses closer than its relative step as if it were a length. It thins the scene by a
+    # share of the scene's box, not of the part.
+    model = np.c_[surface / diameter, normals].astype(np.float32)
     ppf = cv2.ppf_match_3d
     begin = time.perf_counter()
     detector = ppf.PPF3DDetector(0.05, 0.05)
-    detector.trainModel(np.c_[surface, normals].astype(np.float32))
-    thin = points[scenes.thin(points, diameter / 20)]
+    detector.trainModel(model)
+    thin = points[scenes.thin(points, diameter / 20)] / diameter
     _, scene = ppf.computeNormalsPC3d(thin.astype(np.float32), 12, True, np.zeros(3))
-    poses = detector.match(scene, 1 / 5, 0.05)[:100]
-    ppf.ICP(100, 0.005, 2.5, 8).registerModelToScene(
-        np.c_[surface, normals].astype(np.float32), scene, poses
-    )
+    poses = detector.match(scene, 1 / 5, 0.05 / np.ptp(thin, axis=0).max())[:100]
     seconds = time.perf_counter() - begin
     scorer, taken, found, kept = Truth(triangles, diameter, truth), set(), [], []
     for pose in poses:
-        if any(np.linalg.norm(pose.pose[:3, 3] - k) < diameter / 4 for k in kept):
+        at_scene = np.array(pose.pose)
+        at_scene[:3, 3] *= diameter
+        if any(np.linalg.norm(at_scene[:3, 3] - k) < diameter / 4 for k in kept):
             continue  # one pose for each instance
-        kept.append(pose.pose[:3, 3])
-        at = scorer.instance_at(pose.pose)
+        kept.append(at_scene[:3, 3])
+        at = scorer.instance_at(at_scene)
         correct = at is not None and at not in taken
         taken |= {at} if correct else set()
         found.append({"confidence": float(pose.numVotes), "instance": at if correct else -1})
@@ -166,6 +183,7 @@ def opencv_row(arguments, kind, seed, count):
         "view": True,
         "seconds": seconds,
         "device": "opencv",
+        "commit": commit(),
         "visible": [round(float(s), 4) for _, s in truth],
         "found": found,
     }
@@ -206,31 +224,68 @@ def figures(rows, threshold=0.5):
     }
 
 
+def groups(rows):
+    """(name of the grouping, name of the group, its rows); the last one is all."""
+    for key in ("count", "part_points", "kind", "seed"):
+        values = dict.fromkeys(r.get(key) for r in rows)
+        for value in values if key == "kind" else sorted(values):
+            of = [r for r in rows if r.get(key) == value]
+            if len(of) < len(rows) and any(r["visible"] for r in of):
+                yield key, f"{key} {value}".removeprefix("kind "), of
+    yield "all", "all", rows
+
+
 def print_table(rows):
     print(
         "scenes | recall at 95 % precision | recall, precision at .5 | among the poses | reported where there is none | s"
     )
-    groups = [
-        (f"{count} instances", [r for r in rows if r["count"] == count])
-        for count in COUNTS
-        if count
-    ]
-    groups += [
-        (kind, [r for r in rows if r["kind"] == kind])
-        for kind in dict.fromkeys(r["kind"] for r in rows)
-    ]
-    groups += [
-        (f"seed {seed}", [r for r in rows if r["seed"] == seed])
-        for seed in dict.fromkeys(r["seed"] for r in rows)
-    ]
-    for name, of in [*groups, ("all", rows)]:
-        if of:
-            f = figures(of)
+    for _, name, of in groups(rows):
+        f = figures(of)
+        none = sum(r["count"] == 0 for r in of)
+        print(
+            f"{name}: {f['visible']} visible | {f['recall_at_p95']:.3f} | {f['recall']:.3f} {f['precision']:.3f} | "
+            f"{f['candidates']:.3f} | {f['without']} of {none} | {f['seconds']:.2f}"
+        )
+
+
+def record_of(paths):
+    """The figures of records of rows, by set: generated and CAD parts, parts of few points, peers."""
+    sets = {}
+    for path in paths:
+        for r in map(json.loads, path.read_text().splitlines()):
+            name = "generated" if r["kind"] in shapes.KINDS else "cad"
+            if r.get("part_points", PART_POINTS) < PART_POINTS:
+                name = "scan of few points" if r["scan"] else "model of few points"
+            if r["device"] == "opencv":
+                name = "opencv"
+            sets.setdefault(name, []).append(r)
+    if "opencv" in sets:  # the same scenes by gpureg
+        scenes_of_peer = {(r["kind"], r["seed"], r["count"]) for r in sets["opencv"]}
+        sets["beside opencv"] = [
+            r
+            for name in ("generated", "cad")
+            for r in sets.get(name, ())
+            if (r["kind"], r["seed"], r["count"]) in scenes_of_peer
+        ]
+    out = {
+        "command": "bench/find/run.py --record",
+        "commit": ", ".join(sorted({r["commit"] for of in sets.values() for r in of})),
+        "devices": sorted({r["device"] for of in sets.values() for r in of} - {"opencv"}),
+        "confidences": sorted(
+            {r.get("fit", "of the library") for of in sets.values() for r in of if "fit" in r}
+        ),
+        "sets": {},
+    }
+    for name, rows in sets.items():
+        entry = out["sets"][name] = {}
+        for key, group, of in groups(rows):
+            f = {
+                k: (round(v, 4) if np.isfinite(v) else None) if isinstance(v, float) else v
+                for k, v in figures(of).items()
+            }
             none = sum(r["count"] == 0 for r in of)
-            print(
-                f"{name}: {f['visible']} visible | {f['recall_at_p95']:.3f} | {f['recall']:.3f} {f['precision']:.3f} | "
-                f"{f['candidates']:.3f} | {f['without']} of {none} | {f['seconds']:.2f}"
-            )
+            entry.setdefault(key, []).append({"name": group, **f, "scenes_without": none})
+    return out
 
 
 def main():
@@ -240,6 +295,11 @@ def main():
     )
     parser.add_argument("--seeds", default="1,2,3")
     parser.add_argument("--counts", default=",".join(map(str, COUNTS)))
+    parser.add_argument("--part-points", type=int, default=PART_POINTS, help="sampled on the part")
+    parser.add_argument("--scan", action="store_true", help="the part's points have no normals")
+    parser.add_argument(
+        "--voxel", type=float, default=0, help="of the search, over the diameter; 0: chosen"
+    )
     parser.add_argument("--quality", type=int, default=5)
     parser.add_argument("--backend", default="cpu", choices=("cpu", "cuda"))
     parser.add_argument("--threads", type=int, default=0, help="of the CPU backend; 0: all")
@@ -249,7 +309,16 @@ def main():
     )
     parser.add_argument("--data", default="shared/data", help="folder with cad")
     parser.add_argument("--output", help="record, a row a line; rows that it has are not run again")
+    parser.add_argument(
+        "--record",
+        nargs="+",
+        type=pathlib.Path,
+        metavar="ROWS",
+        help=f"write {RECORD.relative_to(ROOT)} from such records; nothing is run",
+    )
     arguments = parser.parse_args()
+    if arguments.record:
+        return save(RECORD, record_of(arguments.record))
     if arguments.peer:
         run = opencv_row
     else:

@@ -187,15 +187,37 @@ TEST(Find, SaysWhereASceneMayBeInAnotherUnit) {
   EXPECT_EQ(none.out.find("neighbourhoods"), std::string::npos) << none.out;
 }
 
-TEST(Find, NamesAPartWhosePointsAreFarApart) {
-  const TemporaryFolder folder;
+/// Of the points one of so many.
+PointCloud thinned_scan(std::size_t points, std::size_t first = 0) {
   const PointCloud scan = part_scan();
   PointCloud thin;
-  for (std::size_t k = 0; k < scan.points.size(); k += scan.points.size() / 200)
+  for (std::size_t k = first; k < scan.points.size(); k += scan.points.size() / points)
     thin.points.push_back(scan.points[k]);
-  const std::string part = write_cloud(folder, "part.ply", thin),
+  return thin;
+}
+
+TEST(Find, NamesAPartWhosePointsAreFarApart) {
+  const TemporaryFolder folder;
+  const std::string part = write_cloud(folder, "part.ply", thinned_scan(50)),
                     scene = write_scene(folder, "scene.ply", three_parts());
   expect_refused({"find", part, scene}, {"points of the part", "apart", "a fortieth"});
+}
+
+TEST(Find, APartOfFewPointsIsCertainNowhereElse) {
+  const TemporaryFolder folder;
+  const std::vector<Body> bodies = three_parts();
+  const std::string scene = write_scene(folder, "scene.ply", bodies),
+                    tray = write_scene(folder, "tray.ply", junk()), json = folder / "r.json";
+  for (const std::size_t points : {200u, 500u})
+    for (const std::size_t first : {0u, 7u}) {
+      const std::string part = write_cloud(folder, "part.ply", thinned_scan(points, first));
+      const Outcome found = find(part, scene, {"--json", json});
+      expect_holds(found.err, {"coarse for this part"});
+      for (const nlohmann::json& instance : json_of(json).at("instances"))
+        EXPECT_LT(error(instance, bodies), 0.005) << points << " points\n" << found.out;
+      const Outcome none = find(part, tray);
+      EXPECT_EQ(none.status, 1) << points << " points\n" << none.out;
+    }
 }
 
 TEST(Find, CountsThePosesBelowTheThreshold) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "localization/find/part_confidence.hpp"
 #include "support/cpu_context.hpp"
 #include "support/expect_error.hpp"
 #include "support/tray.hpp"
@@ -112,6 +113,29 @@ TEST(FindPart, AHiddenPartSupportsLessAndIsOccluded) {
   EXPECT_LT(error(hidden.instances.front(), bodies.front()), 0.003);
   EXPECT_GT(hidden.instances.front().evidence.occluded,
             open.instances.front().evidence.occluded + 0.1);
+}
+
+TEST(FindPart, TheSameSharesOfFewerCellsAreLessCertain) {
+  PartEvidence e;
+  e.viewpoint_known = true;
+  e.supported = e.contour = 1;
+  e.contour_length = 3;
+  e.area = 0.25;
+  e.residual = 0.1;
+  e.weakest = 0.1;
+  e.third_weakest = 0.2;
+  e.votes = 40;
+  double before = 1;
+  for (const double cell : {0.025, 0.05, 0.1, 0.2, 0.4, 1.0, 10.0}) {
+    e.cell = cell;
+    const double confidence = part_confidence(e);
+    EXPECT_LT(confidence, before) << cell;
+    before = confidence;
+    if (cell == 0.025) EXPECT_GT(confidence, 0.95);
+  }
+  EXPECT_LT(before, 0.5);  // next to no cell
+  e.cell = 0;              // nothing was judged
+  EXPECT_LT(part_confidence(e), 0.5);
 }
 
 TEST(FindPart, SaysWhatIsWrongWithItsInput) {

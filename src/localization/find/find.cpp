@@ -40,9 +40,9 @@ constexpr std::size_t kMostRefined = 400;
 /// Searches of what the likely instances leave, and their log odds.
 constexpr int kRepetitions = 1;
 constexpr double kLikely = 0;
-/// Evidence is not coarser than this share of the diameter because of the part. Of scans of 200
-/// points no instance was found in four scenes, and two of seven scenes had a wrong one.
-constexpr double kCoarsestOfPart = 0.07;
+/// Evidence is not coarser than this share of the diameter because of the part: a depth image of
+/// fewer pixels shows no shape.
+constexpr double kCoarsestOfPart = 0.12;
 /// Log odds from which a pose is worth a look.
 constexpr double kDoubtful = -3;
 /// Fewest prepared points of a part and of a scene.

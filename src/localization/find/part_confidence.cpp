@@ -2,6 +2,7 @@
 #include "localization/find/part_confidence.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "localization/find/part_confidence_model.hpp"
 #include "math/exponential.hpp"
@@ -11,15 +12,29 @@ namespace {
 
 constexpr double kLeast = 1e-6;  // of what a logarithm is taken of
 
+/// Cells along an edge of what is independent: a point of the scene serves its neighbours, too.
+constexpr double kDependent = 2;
+
+/// What a share of `count` trials is at least, one standard deviation down (Wilson).
+double at_least(double share, double count) {
+  if (!(count > 0)) return 0;
+  const double half = 0.5 / count;
+  return std::max(
+      0.0, (share + half - std::sqrt(share * (1 - share) / count + half * half)) / (1 + 2 * half));
+}
+
 double log_of(double x) { return portable::log(std::max(x, kLeast)); }
 
 }  // namespace
 
 std::array<double, kPartFeatures> part_features(const PartEvidence& e) {
-  return {e.supported,
-          e.violated,
+  const double edge = kDependent * e.cell;
+  const double open = e.supported > 0 && edge > 0 ? e.area / e.supported / (edge * edge) : 0;
+  const double outline = edge > 0 ? e.contour_length / edge : 0;
+  return {at_least(e.supported, open),
+          1 - at_least(1 - e.violated, open),
           e.occluded,
-          e.contour,
+          at_least(e.contour, outline),
           e.contour_length,
           log_of(e.area),
           e.residual,

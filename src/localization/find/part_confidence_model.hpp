@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Written by bench/find/fit.py: 48 scenes of 13 kinds of parts, 4061 poses.
+// Written by bench/find/fit.py: 290 scenes of 16 kinds of parts, 5514 poses.
 #pragma once
 
 #include <iterator>
@@ -21,37 +21,41 @@ struct PartModel {
 };
 
 constexpr PartStep kInViewSteps[] = {
-    {PartFeature::supported, 0.317928436, 0.625864135, 0.182529632},
-    {PartFeature::supported, 0.625864135, 0.886578045, 1.96893308},
-    {PartFeature::supported, 0.886578045, 0.962318841, 1.03745099},
-    {PartFeature::supported, 0.962318841, 1, 0.223238821},
-    {PartFeature::violated, 0, 0.209379845, -0.730223722},
-    {PartFeature::contour, 0, 0.368421053, 0.61255021},
-    {PartFeature::contour, 0.368421053, 0.765432099, 1.08909394},
-    {PartFeature::contour, 0.765432099, 0.910569106, 0.45982028},
-    {PartFeature::contour_length, 0, 0.499999981, 0.23312644},
-    {PartFeature::contour_length, 0.499999981, 1.12499996, 1.88442057},
-    {PartFeature::contour_length, 1.12499996, 2.17824766, 1.48475717},
-    {PartFeature::contour_length, 2.17824766, 3.85557111, 0.171615126},
-    {PartFeature::log_area, -3.48493334, -2.3059459, 0.0903822965},
-    {PartFeature::log_area, -2.3059459, -1.83081125, 0.544909013},
-    {PartFeature::log_area, -1.83081125, -1.497226, 0.272791809},
-    {PartFeature::log_area, -1.497226, -0.706992662, 0.390078926},
-    {PartFeature::residual, 0.134806964, 0.174564991, -0.627704699},
-    {PartFeature::residual, 0.174564991, 0.325838551, -1.60650178},
-    {PartFeature::residual, 0.325838551, 0.527867367, -0.480857543},
-    {PartFeature::log_weakest, -4.32079255, -3.81688396, 1.23232286},
-    {PartFeature::log_weakest, -3.81688396, -2.96176989, 0.0951706734},
-    {PartFeature::log_third_weakest, -4.76421976, -2.93235766, 0.402529611},
-    {PartFeature::log_third_weakest, -2.93235766, -2.55203581, 0.831387906},
-    {PartFeature::log_third_weakest, -2.55203581, -2.25969479, 0.586233994},
-    {PartFeature::log_third_weakest, -2.25969479, -1.83509159, 0.381806586},
-    {PartFeature::log_votes, 0, 0.693147181, 0.595953382},
-    {PartFeature::log_votes, 0.693147181, 1.94591015, 0.977349162},
-    {PartFeature::log_votes, 1.94591015, 3.33220451, 0.0685001049},
-    {PartFeature::rival, 0.636083516, 0.850649241, -0.501269087},
-    {PartFeature::rival, 0.850649241, 1.60345883, -0.86264141}};
-constexpr PartModel kInView{-8.57935349, kInViewSteps, std::size(kInViewSteps)};
+    {PartFeature::supported, 0.173156841, 0.631734915, 0.34390196},
+    {PartFeature::supported, 0.631734915, 0.821153599, 1.05668074},
+    {PartFeature::supported, 0.821153599, 0.922982976, 0.717535719},
+    {PartFeature::supported, 0.922982976, 0.991906049, 0.286235843},
+    {PartFeature::violated, 0.0110192838, 0.0184295943, -0.568428357},
+    {PartFeature::violated, 0.0184295943, 0.0577547318, -0.966845303},
+    {PartFeature::violated, 0.0577547318, 0.379530963, -0.263024919},
+    {PartFeature::contour, 0, 0.169864125, 0.580578597},
+    {PartFeature::contour, 0.169864125, 0.595856513, 1.18095999},
+    {PartFeature::contour, 0.595856513, 0.824140842, 0.699722742},
+    {PartFeature::contour, 0.824140842, 0.981485119, 0.159313675},
+    {PartFeature::contour_length, 0.0251804332, 1.10217821, 0.151467268},
+    {PartFeature::contour_length, 1.10217821, 1.64999975, 0.952322595},
+    {PartFeature::contour_length, 1.64999975, 2.25204872, 0.760716743},
+    {PartFeature::contour_length, 2.25204872, 3.95322357, 0.126087309},
+    {PartFeature::log_area, -4.72431876, -2.15388994, 0.236562263},
+    {PartFeature::log_area, -2.15388994, -1.74146014, 0.232989022},
+    {PartFeature::residual, 0.132746428, 0.16778027, -0.219219731},
+    {PartFeature::residual, 0.16778027, 0.231216367, -0.782120049},
+    {PartFeature::residual, 0.231216367, 0.508528497, -0.9282244},
+    {PartFeature::log_weakest, -5.42734682, -4.1836546, 0.00727426881},
+    {PartFeature::log_weakest, -4.1836546, -3.68580355, 0.0822938496},
+    {PartFeature::log_weakest, -3.68580355, -2.4742136, 0.0858510948},
+    {PartFeature::log_third_weakest, -7.83680909, -2.96712976, 0.212321615},
+    {PartFeature::log_third_weakest, -2.96712976, -2.47310027, 0.855455478},
+    {PartFeature::log_third_weakest, -2.47310027, -2.22710724, 0.565317798},
+    {PartFeature::log_third_weakest, -2.22710724, -1.75627644, 0.275626038},
+    {PartFeature::log_votes, 0, 1.09861229, 0.944768748},
+    {PartFeature::log_votes, 1.09861229, 2.19722458, 0.867882075},
+    {PartFeature::log_votes, 2.19722458, 3.63758616, 0.262133037},
+    {PartFeature::rival, 0, 0.309366424, -0.0931646172},
+    {PartFeature::rival, 0.309366424, 0.834824475, -0.305327568},
+    {PartFeature::rival, 0.834824475, 1.00909455, -0.832567665},
+    {PartFeature::rival, 1.00909455, 2.59259259, -0.0201094166}};
+constexpr PartModel kInView{-5.29956827, kInViewSteps, std::size(kInViewSteps)};
 
 constexpr PartStep kUnseenSteps[] = {
     {PartFeature::supported, 0.403311727, 0.619142572, 0.488180446},

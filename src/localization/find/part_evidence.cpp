@@ -274,6 +274,7 @@ PartVerifier::Verdict PartVerifier::verify_in(const RowPose& pose, const SceneVi
   const double pixel = static_cast<double>(voxel_) / static_cast<double>(part_.diameter);
   e.contour_length = static_cast<double>(receding + going_on) * pixel;
   e.area = static_cast<double>(sums.count) * pixel * pixel;
+  e.cell = pixel;
   sums.conclude(voxel_, out);
   return out;
 }
@@ -321,6 +322,7 @@ PartVerifier::Verdict PartVerifier::verify_unseen(const RowPose& pose) const {
   out.evidence.contour = 0.5;
   const double disc = static_cast<double>(part_.spacing) / static_cast<double>(part_.diameter);
   out.evidence.area = static_cast<double>(sums.count) * disc * disc;
+  out.evidence.cell = disc;
   sums.conclude(voxel_, out);
   return out;
 }
