@@ -12,7 +12,7 @@ import pathlib
 import re
 import sys
 
-from tables import accuracy, loops, maps, peers, scale, slam, speed
+from tables import accuracy, find, loops, maps, peers, scale, slam, speed
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 FILES = ("README.md", "docs/*.md", "bench/notes/*.md")
@@ -22,6 +22,7 @@ TABLES = {
     **speed.TABLES,
     **maps.TABLES,
     **loops.TABLES,
+    **find.TABLES,
     **scale.TABLES,
     **slam.TABLES,
 }
