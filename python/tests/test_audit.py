@@ -77,6 +77,8 @@ def two_rooms(points):
 def test_islands_are_judged_each_in_its_frame(two_rooms, tmp_path):
     map = gpureg.reconstruct(two_rooms, options=OPTIONS, refine=False)
     assert map.islands == [[0, 1, 2, 3, 4], [5, 6, 7]] and not map.places_look_alike
+    contradicted, edges_per_scan, jumps = map.agreement
+    assert contradicted < 0.1 and edges_per_scan > 1 and 0 <= jumps < 1
     assert map.audit.verdict == "sound"
     audit = gpureg.audit(two_rooms, map, options=OPTIONS)
     assert [(i.scans, i.verdict) for i in audit.islands] == [(i, "sound") for i in map.islands]
