@@ -8,7 +8,7 @@ alike ones, and of each the kinds, have the same weight, a set that of its poses
 poses, a fit on the other kinds calls alike.
 
     fit_alike.py --gather ROWS.json KIND=SCENE_FOLDER ... [--backend cuda]    adds rows
-    fit_alike.py ROWS.json [--write]    (src/reconstruction/audit/alike_model.hpp)
+    fit_alike.py ROWS.json [--write]    (src/reconstruction/audit/alike_model.hpp, and `kinds` of ROWS.json)
 
 SCENE_FOLDER has cloud_bin_<i>.ply, cameras.txt and poses.txt. Needs the package gpureg, numpy and scipy.
 """
@@ -21,6 +21,7 @@ import random
 import re
 
 import numpy as np
+from record import save
 from scipy.optimize import minimize
 
 HEADER = pathlib.Path(__file__).resolve().parents[2] / "src/reconstruction/audit/alike_model.hpp"
@@ -52,7 +53,7 @@ def gather(file, places, backend):
     import gpureg
     from map_rmse import read_poses
 
-    out = json.loads(file.read_text()) if file.exists() else []
+    out = json.loads(file.read_text())["sets"] if file.exists() else []
     context = getattr(gpureg.Context, backend)()
     options = gpureg.RegistrationOptions(voxel_size=VOXEL)
     for place in places:
@@ -100,7 +101,7 @@ def gather(file, places, backend):
                 }
             )
         print(kind, folder.name, flush=True)
-        file.write_text("[\n" + ",\n".join(map(json.dumps, out)) + "\n]\n")
+        save(file, {"sets": out})
 
 
 def features(rows):
@@ -146,17 +147,24 @@ def main():
     arguments = parser.parse_args()
     if arguments.gather:
         return gather(arguments.rows, arguments.places, arguments.backend)
-    rows = json.loads(arguments.rows.read_text())
+    rows = json.loads(arguments.rows.read_text())["sets"]
+    kinds = []
     alike = alike_scenes(rows)
     for kind in dict.fromkeys(r["kind"] for r in rows):
         p = fit([r for r in rows if r["kind"] != kind])
         own = [r for r in rows if r["kind"] == kind]
         called = [r for r in own if features([r])[0] @ p > 0]
-        share = sum(r["reported"] for r in called) / sum(r["reported"] for r in own)
-        print(
-            f"{kind:12} {'alike' if own[0]['scene'] in alike else 'distinct':9} called alike: "
-            f"{len(called)} of {len(own)}, {100 * share:.0f} % of the poses"
+        poses = sum(r["reported"] for r in called) / sum(r["reported"] for r in own)
+        kinds.append(
+            {
+                "kind": kind,
+                "alike": own[0]["scene"] in alike,
+                "sets": len(own),
+                "called_alike": len(called),
+                "poses_percent": round(100 * poses),
+            }
         )
+        print(kinds[-1])
     p = fit(rows)
     print("bias, contradicted, jumps:", *p.round(3))
     if arguments.write:
@@ -164,6 +172,7 @@ def main():
         values = ", ".join(f"{name} = {value:.3g}" for name, value in zip(names, p))
         text = re.sub(r"kBias = .*;", values + ";", HEADER.read_text())
         HEADER.write_text(text)
+        save(arguments.rows, {"kinds": kinds, "sets": rows})
 
 
 if __name__ == "__main__":

@@ -308,7 +308,22 @@ def risk_of_scans():
     return [*rows, "", source(record) + "."]
 
 
+def alike_kinds():
+    """Sets of each kind that a fit on the other kinds calls alike."""
+    rows = [
+        "| kind | places | called alike, of sets | their share of the poses, % |",
+        "| --- | --- | --- | --- |",
+    ]
+    for of in load("alike_sets.json")["kinds"]:
+        places = "alike" if of["alike"] else "distinct"
+        rows.append(
+            f"| {of['kind']} | {places} | {of['called_alike']} of {of['sets']} | {of['poses_percent']} |"
+        )
+    return rows
+
+
 TABLES = {
+    "alike_kinds": alike_kinds,
     "risk_of_scans": risk_of_scans,
     "maps": maps,
     "maps_repeated": maps_repeated,

@@ -39,7 +39,7 @@ struct Fields<localization::PartEvidence> {
     v(&E::contour, {"contour", "Of the outline around the supported surface, the share behind which the scene recedes."});
     v(&E::contour_length, {"contour_length", "Of the outline that tells, over the diameter of the part."});
     v(&E::area, {"area", "Supported, seen from the sensor, over the squared diameter."});
-    v(&E::cell, {"cell", "Edge of what was judged at once, over the diameter: fewer cells, less certainty."});
+    v(&E::cell, {"cell", "Edge of a pixel of the depth image of the part, over the diameter; without a viewpoint, the spacing of its points."});
     v(&E::residual, {"residual", "RMS distance of the supported surface, over the voxel of the evidence."});
     v(&E::weakest, {"weakest", "Smallest eigenvalue of the point-to-plane information per point, rotations in units of the part's radius."});
     v(&E::third_weakest, {"third_weakest", "The third smallest one."});

@@ -40,7 +40,7 @@ struct PartEvidence {
   double contour = 0;
   double contour_length = 0;  ///< of the outline that tells, over the diameter of the part
   double area = 0;            ///< supported, seen from the sensor, over the squared diameter
-  double cell = 0;            ///< edge of what was judged at once, over the diameter
+  double cell = 0;            ///< edge of a pixel of the depth image, over the diameter
   double residual = 1;        ///< RMS distance of the supported surface, over the voxel of evidence
   /// Smallest eigenvalue, and third smallest, of the point-to-plane information of the supported
   /// surface per point, with rotations about its middle in units of the part's radius.

@@ -40,8 +40,8 @@ constexpr std::size_t kMostRefined = 400;
 /// Searches of what the likely instances leave, and their log odds.
 constexpr int kRepetitions = 1;
 constexpr double kLikely = 0;
-/// Evidence is not coarser than this share of the diameter because of the part: a depth image of
-/// fewer pixels shows no shape.
+/// Evidence is not coarser than this share of the diameter because of the part: the confidence was
+/// fitted to pixels of up to 0.106 of it.
 constexpr double kCoarsestOfPart = 0.12;
 /// Log odds from which a pose is worth a look.
 constexpr double kDoubtful = -3;

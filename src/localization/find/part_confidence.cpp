@@ -12,10 +12,12 @@ namespace {
 
 constexpr double kLeast = 1e-6;  // of what a logarithm is taken of
 
-/// Cells along an edge of what is independent: a point of the scene serves its neighbours, too.
+/// Neighbouring pixels are judged by the same points of the scene: a block of so many along each
+/// edge counts as one independent trial.
 constexpr double kDependent = 2;
 
-/// What a share of `count` trials is at least, one standard deviation down (Wilson).
+/// Lower bound of the probability behind a share of `count` independent trials, one standard
+/// deviation (Wilson 1927).
 double at_least(double share, double count) {
   if (!(count > 0)) return 0;
   const double half = 0.5 / count;

@@ -25,7 +25,7 @@ enum class PartFeature : std::size_t {
 };
 constexpr std::size_t kPartFeatures = static_cast<std::size_t>(PartFeature::count);
 
-/// Shares count as the least that the number of cells behind them allows: no certainty without
+/// A share counts as the lower bound that its number of pixels allows: no certainty without
 /// evidence.
 std::array<double, kPartFeatures> part_features(const PartEvidence& evidence);
 
