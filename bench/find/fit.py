@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fits the confidence of parts to records of run.py and writes its header: bench/find/fit.py RECORD... Needs scipy.
+"""Fits the confidence of parts to records of run.py and writes its header: bench/find/fit.py RECORD... Needs scipy and the Python package
+gpureg.
 
 Prints what fits that have not seen a kind of part make of it."""
 
@@ -10,6 +11,7 @@ import re
 import sys
 import typing
 
+import gpureg
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -20,7 +22,6 @@ from confidence.model_header import clang_format
 from confidence.regressions import monotone
 
 HEADER = ROOT / "src/localization/find/part_confidence_model.hpp"
-LEAST = 1e-6  # as part_confidence.cpp
 # Direction in which each feature may move the odds, in the order of PartFeature.
 SIGNS = {
     "supported": 1,
@@ -42,41 +43,14 @@ UNSEEN = {
 }
 
 
-DEPENDENT = 2  # as part_confidence.cpp
-
-
-def at_least(share, count):
-    """What a share of so many trials is at least, one standard deviation down (Wilson)."""
-    if not count > 0:
-        return 0.0
-    half = 0.5 / count
-    return max(
-        0.0, (share + half - (share * (1 - share) / count + half * half) ** 0.5) / (1 + 2 * half)
-    )
-
-
 class Shipped(typing.NamedTuple):
     bias: float
     steps: list
 
 
 def features(evidence):
-    e = dict(evidence)
-    edge = DEPENDENT * e["cell"]
-    cells = e["area"] / e["supported"] / edge**2 if e["supported"] > 0 and edge > 0 else 0
-    outline = e["contour_length"] / edge if edge > 0 else 0
-    evidence = {
-        **e,
-        "supported": at_least(e["supported"], cells),
-        "violated": 1 - at_least(1 - e["violated"], cells),
-        "contour": at_least(e["contour"], outline),
-    }
-    return [
-        np.log(max(evidence[n.removeprefix("log_")], LEAST))
-        if n.startswith("log_")
-        else float(evidence[n])
-        for n in SIGNS
-    ]
+    """By the library, so that the fit and the confidence have the same ones."""
+    return gpureg._core._part_features(evidence)
 
 
 def samples(rows):

@@ -3,17 +3,34 @@
 
 #include <pybind11/stl.h>
 
+#include <array>
 #include <cstdio>
+#include <type_traits>
 
 #include "cloud_input.hpp"
 #include "fields.hpp"
 #include "fields/find.hpp"
 #include "interrupt.hpp"
+#include "localization/find/part_confidence.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
 
 using namespace localization;
+
+namespace {
+
+/// @param evidence by names, as a record has it.
+std::array<double, kPartFeatures> features_of(const py::dict& evidence) {
+  PartEvidence out;
+  fields::Fields<PartEvidence>::visit([&](auto member, const fields::Field& field) {
+    auto& value = out.*member;
+    value = py::cast<std::decay_t<decltype(value)>>(evidence[field.name]);
+  });
+  return part_features(out);
+}
+
+}  // namespace
 
 void bind_find(py::module_& m) {
   bind_options_class<FindOptions>(m);
@@ -73,6 +90,8 @@ void bind_find(py::module_& m) {
         return interruptible([&] { return find(context, of_part.view, of_scene.view, options); });
       },
       py::arg("context"), py::arg("part"), py::arg("scene"), py::arg("options"));
+  m.def("_part_features", &features_of, py::arg("evidence"),
+        "Features of the confidence of a part, in the order of PartFeature.");
 }
 
 }  // namespace gpureg::python
