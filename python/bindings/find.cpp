@@ -21,7 +21,7 @@ using namespace localization;
 namespace {
 
 /// @param evidence by names, as a record has it.
-std::array<double, kPartFeatures> features_of(const py::dict& evidence) {
+std::array<double, kPartFeatures> part_features_of(const py::dict& evidence) {
   PartEvidence out;
   fields::Fields<PartEvidence>::visit([&](auto member, const fields::Field& field) {
     auto& value = out.*member;
@@ -90,7 +90,7 @@ void bind_find(py::module_& m) {
         return interruptible([&] { return find(context, of_part.view, of_scene.view, options); });
       },
       py::arg("context"), py::arg("part"), py::arg("scene"), py::arg("options"));
-  m.def("_part_features", &features_of, py::arg("evidence"),
+  m.def("_part_features", &part_features_of, py::arg("evidence"),
         "Features of the confidence of a part, in the order of PartFeature.");
 }
 
