@@ -8,8 +8,10 @@ part has. An instance counts as visible if 40 % or more of the pixels that it wo
 import argparse
 import json
 import pathlib
+import struct
 import sys
 import time
+import types
 
 import numpy as np
 
@@ -26,6 +28,7 @@ COUNTS = (0, 1, 5, 20)
 CLUTTER = 6
 PRECISION = 0.95
 PART_POINTS = 20000
+PEERS = {"opencv", "pcl"}
 
 
 def read_stl(path):
@@ -176,13 +179,45 @@ def opencv_row(arguments, kind, seed, count):
         correct = at is not None and at not in taken
         taken |= {at} if correct else set()
         found.append({"confidence": float(pose.numVotes), "instance": at if correct else -1})
+    return peer_row("opencv", kind, seed, count, seconds, truth, found)
+
+
+def pcl_row(arguments, kind, seed, count):
+    """PCL's template alignment (SampleConsensusInitialAlignment), one pose for each scene, in voxels of a fiftieth
+    of the diameter as in its tutorial: the part's points with exact normals, PCL's own for the scene."""
+    sys.path.append(str(ROOT / "bench/peers"))
+    from methods import pcl_prerejective
+
+    triangles, diameter, points, truth = scene_of(kind, seed, count, arguments.data)
+    surface, normals = shapes.sample(triangles, PART_POINTS, np.random.default_rng(1))
+    pcl_prerejective.VOXEL = diameter / 50
+    kept = scenes.thin(surface, diameter / 50)
+    thin = points[scenes.thin(points, diameter / 50)]
+    begin = time.perf_counter()
+    peer = pcl_prerejective.Prerejective()
+    clouds = [
+        peer.prepare(types.SimpleNamespace(points=p, normals=n))
+        for p, n in ((surface[kept], normals[kept]), (thin, np.zeros_like(thin)))
+    ]
+    answer = peer.ask(
+        b"t" + struct.pack("<III", clouds[0]["index"], clouds[1]["index"], seed)
+    )
+    seconds = time.perf_counter() - begin
+    peer.child.stdin.close()
+    peer.child.wait()
+    at = Truth(triangles, diameter, truth).instance_at(np.reshape(answer[3:19], (4, 4)))
+    found = [{"confidence": answer[0] / diameter**2, "instance": -1 if at is None else at}]
+    return peer_row("pcl", kind, seed, count, seconds, truth, found)
+
+
+def peer_row(peer, kind, seed, count, seconds, truth, found):
     return {
         "kind": kind,
         "seed": seed,
         "count": count,
         "view": True,
         "seconds": seconds,
-        "device": "opencv",
+        "device": peer,
         "commit": commit(),
         "visible": [round(float(s), 4) for _, s in truth],
         "found": found,
@@ -216,6 +251,11 @@ def figures(rows, threshold=0.5):
         "recall_at_p95": float(seen[precise[-1]] / visible) if precise and visible else 0.0,
         "recall": sum(v for _, _, v in reported) / visible if visible else float("nan"),
         "precision": sum(c for _, c, _ in reported) / len(reported) if reported else float("nan"),
+        "first": sum(
+            max(r["found"], key=lambda f: f["confidence"])["instance"] >= 0
+            for r in rows
+            if r["found"] and any(s >= VISIBLE for s in r["visible"])
+        ),
         "candidates": float(seen[-1] / visible) if len(poses) and visible else 0.0,
         "without": sum(
             any(f["confidence"] >= threshold for f in r["found"]) for r in rows if r["count"] == 0
@@ -256,12 +296,11 @@ def record_of(paths):
             name = "generated" if r["kind"] in shapes.KINDS else "cad"
             if r.get("part_points", PART_POINTS) < PART_POINTS:
                 name = "scan of few points" if r["scan"] else "model of few points"
-            if r["device"] == "opencv":
-                name = "opencv"
+            name = r["device"] if r["device"] in PEERS else name
             sets.setdefault(name, []).append(r)
-    if "opencv" in sets:  # the same scenes by gpureg
-        scenes_of_peer = {(r["kind"], r["seed"], r["count"]) for r in sets["opencv"]}
-        sets["beside opencv"] = [
+    for peer in sets.keys() & PEERS:  # the same scenes by gpureg
+        scenes_of_peer = {(r["kind"], r["seed"], r["count"]) for r in sets[peer]}
+        sets[f"beside {peer}"] = [
             r
             for name in ("generated", "cad")
             for r in sets.get(name, ())
@@ -270,7 +309,7 @@ def record_of(paths):
     out = {
         "command": "bench/find/run.py --record",
         "commit": ", ".join(sorted({r["commit"] for of in sets.values() for r in of})),
-        "devices": sorted({r["device"] for of in sets.values() for r in of} - {"opencv"}),
+        "devices": sorted({r["device"] for of in sets.values() for r in of} - PEERS),
         "confidences": sorted(
             {r.get("fit", "of the library") for of in sets.values() for r in of if "fit" in r}
         ),
@@ -305,7 +344,9 @@ def main():
     parser.add_argument("--threads", type=int, default=0, help="of the CPU backend; 0: all")
     parser.add_argument("--unseen", action="store_true", help="without the viewpoint of the scene")
     parser.add_argument(
-        "--peer", choices=("opencv",), help="needs opencv-contrib-python; its scores are votes"
+        "--peer",
+        choices=sorted(PEERS),
+        help="opencv: needs opencv-contrib-python; its scores are votes. pcl: needs the target gpureg_pcl_peer",
     )
     parser.add_argument("--data", default="shared/data", help="folder with cad")
     parser.add_argument("--output", help="record, a row a line; rows that it has are not run again")
@@ -320,7 +361,7 @@ def main():
     if arguments.record:
         return save(RECORD, record_of(arguments.record))
     if arguments.peer:
-        run = opencv_row
+        run = {"opencv": opencv_row, "pcl": pcl_row}[arguments.peer]
     else:
         import gpureg
 

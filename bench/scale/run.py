@@ -9,11 +9,13 @@ confidence of 0.5; `recall_at_95`: share of the pairs with a correct pose among 
 which 95 % are correct; `scale_error`: median of |scale / factor - 1| of the correct pairs, and the share
 below 0.01; `times`: seconds of all pairs with an unknown scale / with the known one, preparation included.
 `scale_errors` has the signed errors, log(scale / factor). With --voxel auto sets take the voxel size that both clouds suggest at their true scale, as `known` does.
+--peer teaser: TEASER++ instead, with the mutual nearest neighbours of gpureg's features, which are computed with known viewpoints: correct
+`with_known` and `with_free` scale by features at the true scale, and `with_own` by features at the voxel size that each cloud suggests alone.
 
 usage: run.py DATA [--sets kitchen,lidar] [--pairs 8] [--seeds 1 2 3] [--conditions free,one] [--backend cpu]
-       [--json OUT | --copy FOLDER]
+       [--json OUT | --copy FOLDER] [--peer teaser]
 --copy: what these arguments read of DATA, points alone, to measure on another machine.
-Needs numpy and the Python package gpureg."""
+Needs numpy and the Python package gpureg; the peer, scipy and a build of teaserpp_python."""
 
 import json
 import pathlib
@@ -86,9 +88,10 @@ def counts(outcomes):
     }
 
 
-def run(name, scenes, limit, seed, condition, context):
+def moved_pairs(scenes, limit, seed, condition):
+    """Names, clouds at random poses and their viewpoints, factor of the source, options, and what tells whether a
+    similarity of the clouds is correct."""
     rng = np.random.default_rng(seed)
-    known, searched, errors, statuses, seconds = [], [], [], {}, [0.0, 0.0]
     for scene in scenes:
         for s, t, truths in scene.pairs[:limit]:
             if not truths:
@@ -110,30 +113,42 @@ def run(name, scenes, limit, seed, condition, context):
                 points = clouds[0].points[::50]
                 return bool(scene.right(points, rigid_at(points, found), truths))
 
-            begin = time.perf_counter()
-            a = gpureg.register(source, target, options=options, context=context)
-            middle = time.perf_counter()
-            b = gpureg.register(
-                source / factor, target, scale="free", options=options, context=context
-            )
-            seconds[0] += middle - begin
-            seconds[1] += time.perf_counter() - middle
-            of_known = correct(np.asarray(a.target_from_source)) if a.has_pose else False
-            known.append((a.confidence, of_known, a.aligned))
-            error = abs(b.scale / factor - 1)
-            to_source = np.diag([1 / factor, 1 / factor, 1 / factor, 1])
-            found = b.result.has_pose and correct(b.target_from_source @ to_source)
-            found = found and error < 0.1
-            searched.append((b.confidence, found, b.aligned))
-            statuses[b.scale_status] = statuses.get(b.scale_status, 0) + 1
-            if found:
-                errors.append(float(np.log(b.scale / factor)))
-            print(
-                f"{name} {condition} {seed}: {s} {t} factor {factor:.3g}, known {of_known} {a.confidence:.3f}, "
-                f"searched {found} {b.confidence:.3f} {b.scale_status}, error {error:.4f}, "
-                f"{middle - begin:.2f} s and {time.perf_counter() - middle:.2f} s",
-                flush=True,
-            )
+            views = [
+                "auto" if c.viewpoints is None else viewpoints.moved(p, c.viewpoints)
+                for p, c in zip(poses, clouds)
+            ]
+            yield f"{s} {t}", (source, target), views, factor, options, correct
+
+
+def within_scale(similarity, scale, factor, correct):
+    """Whether a similarity from the divided source is correct, and its scale within a tenth."""
+    to_source = np.diag([1 / factor, 1 / factor, 1 / factor, 1])
+    return correct(similarity @ to_source) and abs(scale / factor - 1) < 0.1
+
+
+def run(name, scenes, limit, seed, condition, context):
+    known, searched, errors, statuses, seconds = [], [], [], {}, [0.0, 0.0]
+    pairs = moved_pairs(scenes, limit, seed, condition)
+    for pair, (source, target), _, factor, options, correct in pairs:
+        begin = time.perf_counter()
+        a = gpureg.register(source, target, options=options, context=context)
+        middle = time.perf_counter()
+        b = gpureg.register(source / factor, target, scale="free", options=options, context=context)
+        seconds[0] += middle - begin
+        seconds[1] += time.perf_counter() - middle
+        of_known = correct(np.asarray(a.target_from_source)) if a.has_pose else False
+        known.append((a.confidence, of_known, a.aligned))
+        found = b.result.has_pose and within_scale(b.target_from_source, b.scale, factor, correct)
+        searched.append((b.confidence, found, b.aligned))
+        statuses[b.scale_status] = statuses.get(b.scale_status, 0) + 1
+        if found:
+            errors.append(float(np.log(b.scale / factor)))
+        print(
+            f"{name} {condition} {seed}: {pair} factor {factor:.3g}, known {of_known} {a.confidence:.3f}, "
+            f"searched {found} {b.confidence:.3f} {b.scale_status}, error {abs(b.scale / factor - 1):.4f}, "
+            f"{middle - begin:.2f} s and {time.perf_counter() - middle:.2f} s",
+            flush=True,
+        )
     return {
         "seed": seed,
         "pairs": len(known),
@@ -151,6 +166,76 @@ def run(name, scenes, limit, seed, condition, context):
     }
 
 
+def teaser(p, q, noise, free):
+    """Similarity, scale, seconds of TEASER++ with matches from p to q, as its examples call it."""
+    import teaserpp_python
+
+    solver = teaserpp_python.RobustRegistrationSolver
+    parameters = solver.Params()
+    parameters.cbar2, parameters.noise_bound, parameters.estimate_scaling = 1, noise, free
+    parameters.rotation_estimation_algorithm = solver.ROTATION_ESTIMATION_ALGORITHM.GNC_TLS
+    parameters.rotation_gnc_factor, parameters.rotation_max_iterations = 1.4, 100
+    parameters.rotation_cost_threshold = 1e-12
+    of_pair = solver(parameters)
+    begin = time.perf_counter()
+    of_pair.solve(p.T.astype(float), q.T.astype(float))
+    found, pose = of_pair.getSolution(), np.eye(4)
+    scale = found.scale if free else 1.0
+    pose[:3, :3], pose[:3, 3] = scale * found.rotation, np.ravel(found.translation)
+    return pose, scale, time.perf_counter() - begin
+
+
+def mutual_matches(clouds, views, voxels, context):
+    """Points of two clouds, at the scale in which they are given, whose features match."""
+    from scipy.spatial import cKDTree
+
+    a, b = (
+        gpureg.prepare(
+            c, viewpoints=v, options=gpureg.RegistrationOptions(voxel_size=voxel), context=context
+        )
+        for c, v, voxel in zip(clouds, views, voxels)
+    )
+    forward = cKDTree(b.features).query(a.features)[1]
+    back = cKDTree(a.features).query(b.features)[1]
+    rows = np.flatnonzero(back[forward] == np.arange(len(forward)))
+    return a.points[rows] + a.origin, b.points[forward[rows]] + b.origin
+
+
+def run_teaser(name, scenes, limit, seed, context):
+    known, free, own, errors, seconds, matches = [], [], [], [], [], []
+    pairs = moved_pairs(scenes, limit, seed, "free")
+    for pair, clouds, views, factor, options, correct in pairs:
+        voxel = options.voxel_size
+        p, q = mutual_matches(clouds, views, (voxel, voxel), context)
+        matches.append(len(p))
+        pose, _, _ = teaser(p, q, voxel, False)
+        known.append(correct(pose))
+        pose, scale, of_free = teaser(p / factor, q, voxel, True)
+        seconds.append(of_free)
+        free.append(within_scale(pose, scale, factor, correct))
+        if free[-1]:
+            errors.append(float(np.log(scale / factor)))
+        voxels = [gpureg.suggest_voxel_size([c]).voxel_size for c in clouds]
+        p, q = mutual_matches(clouds, views, voxels, context)
+        pose, scale, _ = teaser(p / factor, q, voxels[1], True)
+        own.append(within_scale(pose, scale, factor, correct))
+        print(
+            f"{name} {seed}: {pair} factor {factor:.3g}, {matches[-1]} matches, known {known[-1]}, "
+            f"free {free[-1]}, own {own[-1]}",
+            flush=True,
+        )
+    return {
+        "seed": seed,
+        "pairs": len(known),
+        "with_known": sum(known),
+        "with_free": sum(free),
+        "with_own": sum(own),
+        "scale_errors": [round(e, 5) for e in errors],
+        "matches": int(np.median(matches)),
+        "seconds": round(float(np.median(seconds)), 3),
+    }
+
+
 def main():
     parser = plain_parser(__doc__)
     parser.add_argument("data", type=pathlib.Path)
@@ -159,6 +244,7 @@ def main():
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--conditions", default="free")
     parser.add_argument("--backend", choices=("cpu", "cuda"), default="cpu")
+    parser.add_argument("--peer", choices=("teaser",))
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--copy", type=pathlib.Path)
     arguments = parser.parse_args()
@@ -170,6 +256,13 @@ def main():
         record = json.loads(arguments.json.read_text())
     for name in arguments.sets.split(","):
         scenes = scenes_of(name, arguments.data, arguments.pairs)
+        if arguments.peer:
+            record["sets"].setdefault(name, {})["teaser"] = [
+                run_teaser(name, scenes, arguments.pairs, seed, context) for seed in arguments.seeds
+            ]
+            if arguments.json:
+                save(arguments.json, record)
+            continue
         entry = {
             "command": f"bench/scale/run.py --sets {name} --pairs {arguments.pairs} "
             f"--seeds {' '.join(map(str, arguments.seeds))} --conditions {arguments.conditions}",
