@@ -13,7 +13,7 @@ namespace gpureg::localization {
 /// Options of find().
 struct FindOptions {
   /// Edge of the voxels of the search, in the unit of the points; 0: a twentieth of the part's
-  /// diameter, and not below the spacing of the scene. Evidence is taken in half of it.
+  /// diameter, and not below the spacing of the scene. Evidence is taken in a quarter of it.
   float voxel_size = 0;
   /// Of the alignments: 0 is the fastest, 10 finds the most.
   std::uint32_t quality = kDefaultQuality;
@@ -79,8 +79,8 @@ struct FindResult {
   /// The same below min_confidence, as far as they deserve a look.
   std::vector<FoundPart> doubtful;
   float voxel_size = 0;  ///< of the search, that was used
-  /// Of the evidence: half of it, or more where the points of the part or of the scene are far
-  /// apart. Confidences were fitted with a fortieth of the diameter.
+  /// Of the evidence: a quarter of it, or more where the points of the part or of the scene are far
+  /// apart. Confidences were fitted with an eightieth of the diameter.
   float evidence_voxel_size = 0;
   double diameter = 0;                            ///< of the part: diagonal of its box
   double scene_extent = 0;                        ///< diagonal of the box of the scene
