@@ -30,11 +30,18 @@ def of_group(sets, condition):
     return total, 100 * statistics.median(errors) if errors else None, times
 
 
+def of_teaser(sets):
+    runs = [run for name in sets for run in name.get("teaser", [])]
+    count = {k: sum(r[k] for r in runs) for k in ("with_known", "with_free", "with_own")} if runs else None
+    return "{with_known}, {with_free}, {with_own}".format(**count) if count else "-"
+
+
 def scale():
     record = load("scale.json")
     rows = [
-        "| data | pairs | correct: scale known, `free` | median error of the scale, % | factor 1 given as `free`: pairs, lost | time, in pairs |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| data | pairs | correct: scale known, `free` | median error of the scale, % | factor 1 given as `free`: pairs, lost | time, in pairs "
+        "| correct, TEASER++: known, free, all free |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for shown, names in GROUPS.items():
         sets = [record["sets"][name] for name in names if name in record["sets"]]
@@ -46,7 +53,7 @@ def scale():
         shown_one = f"{one}, {lost}" if one else "-"
         rows.append(
             f"| {shown} | {pairs} | {known}, {free} | {shown_error} | {shown_one} "
-            f"| {min(times + more):.0f} to {max(times + more):.0f} |"
+            f"| {min(times + more):.0f} to {max(times + more):.0f} | {of_teaser(sets)} |"
         )
     entries = list(record["sets"].values())
     commits = sorted({e["commit"].rstrip("+") for e in entries})
