@@ -31,6 +31,9 @@ constexpr double kSpacings = 1.5, kFineSpacings = 1.2;
 /// ... and so many of a part: its surface must have no holes, and points at random are twice as far
 /// apart on average as nearest neighbours are.
 constexpr double kPartSpacings = 2.9;
+/// Evidence in less than half a voxel of the search needs denser points of the part: its outline
+/// must have no holes either.
+constexpr double kFinePartSpacings = 3.7;
 /// Radius of the pieces of a scene and the distance of their middles, in diameters of the part.
 constexpr double kPieceRadius = 0.6, kPieceDistance = 0.3;
 /// A scene of more pieces than this is in another unit, or no scene.
@@ -277,9 +280,10 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
     throw InvalidArgument("the points of the part are " + shown(of_part, 2) +
                           " apart, but it extends over " + shown(out.diameter, 3) +
                           " only: expected a fortieth of it or less, as points of a mesh have");
-  const float fine =
-      static_cast<float>(std::max({static_cast<double>(out.voxel_size) / kFineVoxels,
-                                   kFineSpacings * spacing, kPartSpacings * of_part}));
+  const double voxel = static_cast<double>(out.voxel_size);
+  const float fine = static_cast<float>(
+      std::max({voxel / kFineVoxels, kFineSpacings * spacing, kPartSpacings * of_part,
+                std::min(voxel / 2, kFinePartSpacings * of_part)}));
   out.evidence_voxel_size = fine;
 
   // The search.
