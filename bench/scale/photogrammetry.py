@@ -11,7 +11,7 @@ The true similarity is that from COLMAP's camera centres to the true ones. `trut
 (median, %), the `noise` of these distances (%), the share that is `off` by 5 % or more, and the share of the scan that
 the cloud has `covered`, within 0.1 m. An error of the scale below `deviation` and `surface` says nothing.
 Conditions: `known` scale; `free`; `given`: free, with cameras and scanners as viewpoints; `sized`: free, with the voxel
-size that both clouds suggest at the true scale. The others take the scan's.
+size that both clouds suggest at the true scale; the others take the scan's. `none`: free, and the cloud has no viewpoint.
 A pose is `found` within 5 degrees and 0.2 m at the cloud's centre. `foreign`: the scan is of the next seed's place.
 
 usage: photogrammetry.py --cache FOLDER [--kinds room,flat,corner,house] [--seeds 1,2,3] [--output ROWS]
@@ -19,6 +19,7 @@ usage: photogrammetry.py --cache FOLDER [--kinds room,flat,corner,house] [--seed
 Needs numpy, scipy, open3d, opencv-python, pycolmap and the Python package gpureg."""
 
 import argparse
+import itertools
 import json
 import pathlib
 import sys
@@ -34,7 +35,7 @@ from record import commit, processor, save
 RECORD = ROOT / "bench/results/photogrammetry.json"
 EXIF_ERROR = 1.03  # of the focal length that the pictures say
 POINTS = 300_000  # of a photogrammetric cloud, at most
-CONDITIONS = ("known", "free", "given", "sized")
+CONDITIONS = ("known", "free", "given", "sized", "none")
 DEGREES, METRES = 5, 0.2  # of a pose that is found
 
 
@@ -244,7 +245,10 @@ def registered(gpureg, context, data, scan_of, rng, condition, truth):
     size = np.linalg.norm(np.ptp(data["cloud"], axis=0))
     source, cameras = (moved(poses[0], data[k] / size * factor) for k in ("cloud", "cameras"))
     target, scanners = (moved(poses[1], scan_of[k]) for k in ("scan", "scanners"))
-    views = {"source_viewpoint": cameras, "target_viewpoint": scanners}
+    views = {
+        "given": {"source_viewpoint": cameras, "target_viewpoint": scanners},
+        "none": {"source_viewpoint": "none"},
+    }
     scale, turn, shift = truth
     true_scale = scale * size / factor
     voxel = None
@@ -257,7 +261,7 @@ def registered(gpureg, context, data, scan_of, rng, condition, truth):
         voxel,
         scale=true_scale if condition == "known" else "free",
         context=context,
-        **(views if condition == "given" else {}),
+        **views.get(condition, {}),
     )
     row = {
         "condition": condition,
@@ -269,6 +273,7 @@ def registered(gpureg, context, data, scan_of, rng, condition, truth):
         "deviation": round(100 * r.scale_deviation / r.scale, 3) if r.scale > 0 else None,
         "voxel": round(r.result.voxel_size, 4),
         "candidates": len(r.candidates),
+        "viewpoints": f"{r.result.source_viewpoint}, {r.result.target_viewpoint}",
     }
     if r.result.has_pose:
         found = np.linalg.inv(poses[1]) @ r.target_from_source @ poses[0]
@@ -329,6 +334,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kinds", default="room,flat,corner,house")
     parser.add_argument("--seeds", default="1,2,3")
+    parser.add_argument("--draws", type=int, default=3, help="of scale and poses, for each pair")
     parser.add_argument("--cache", type=pathlib.Path, help="folder of pictures and clouds")
     parser.add_argument("--threads", type=int, default=1, help="of the registration")
     parser.add_argument("--output", type=pathlib.Path, help="a row a line; rows that it has stay")
@@ -347,7 +353,7 @@ def main():
     context = gpureg.Context.cpu(arguments.threads)
     seeds, path = [int(s) for s in arguments.seeds.split(",")], arguments.output
     lines = path.read_text().splitlines() if path and path.exists() else []
-    keys = ("kind", "seed", "foreign", "condition")
+    keys = ("kind", "seed", "draw", "foreign", "condition")
     done = {tuple(json.loads(line)[k] for k in keys) for line in lines}
     for kind in arguments.kinds.split(","):
         for place, seed in enumerate(seeds):
@@ -363,13 +369,14 @@ def main():
                 if foreign and other == seed:
                     continue
                 scan_of = made(arguments.cache, kind, other) if foreign else data
-                for n, condition in enumerate(CONDITIONS):
-                    if (kind, seed, foreign, condition) in done or (
-                        foreign and condition == "known"
-                    ):
+                for n, draw in itertools.product(range(len(CONDITIONS)), range(arguments.draws)):
+                    condition = CONDITIONS[n]
+                    if (kind, seed, draw, foreign, condition) in done:
                         continue
-                    rng = np.random.default_rng([seed, other, n])
-                    row = {"kind": kind, "seed": seed, "foreign": foreign}
+                    if foreign and condition == "known":
+                        continue
+                    rng = np.random.default_rng([seed, other, n, draw])
+                    row = {"kind": kind, "seed": seed, "draw": draw, "foreign": foreign}
                     row |= registered(gpureg, context, data, scan_of, rng, condition, truth)
                     row["found"] &= not foreign
                     row |= {
