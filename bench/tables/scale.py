@@ -32,7 +32,11 @@ def of_group(sets, condition):
 
 def of_teaser(sets):
     runs = [run for name in sets for run in name.get("teaser", [])]
-    count = {k: sum(r[k] for r in runs) for k in ("with_known", "with_free", "with_own")} if runs else None
+    count = (
+        {k: sum(r[k] for r in runs) for k in ("with_known", "with_free", "with_own")}
+        if runs
+        else None
+    )
     return "{with_known}, {with_free}, {with_own}".format(**count) if count else "-"
 
 
@@ -65,4 +69,46 @@ def scale():
     ]
 
 
-TABLES = {"scale": scale}
+PLACES = {
+    "room": "a room, all of it",
+    "flat": "two rooms and a doorway",
+    "corner": "a third of one room, scan of two rooms",
+    "house": "a house from outside",
+}
+SEARCHES = {
+    "known": "scale known",
+    "free": "`free`",
+    "given": "`free`, viewpoints given",
+    "sized": "`free`, voxel size of both clouds",
+    "none": "`free`, source viewpoint `none`",
+}
+
+
+def photogrammetry():
+    record = load("photogrammetry.json")
+    rows = [
+        "| pictures of | pairs | search | found, reported | scale within 1 % | error of the scale, %: median, largest | lowest confidence | foreign pairs: reported, highest confidence | s |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for g in record["groups"]:
+        error = "-"
+        if g["condition"] != "known" and g["found"]:
+            error = f"{g['scale_error']:.2f}, {g['largest_scale_error']:.2f}"
+        within = "-" if g["condition"] == "known" else g["within_1_percent"]
+        foreign = "-"
+        if g["foreign"]:
+            foreign = f"{g['foreign_reported']} of {g['foreign']}, {g['foreign_confidence']:.2f}"
+        confidence = "-" if g["least_confidence"] is None else f"{g['least_confidence']:.2f}"
+        rows.append(
+            f"| {PLACES[g['kind']]} | {g['pairs']} | {SEARCHES[g['condition']]} | {g['found']}, {g['reported']} "
+            f"| {within} | {error} | {confidence} | {foreign} | {g['seconds']:.0f} |"
+        )
+    commits = ", ".join(sorted({c.rstrip("+") for c in record["commit"].split(", ")}))
+    return [
+        *rows,
+        "",
+        f"Made by `bench/scale/photogrammetry.py` at commit {commits} on {record['processor']}; one thread each.",
+    ]
+
+
+TABLES = {"scale": scale, "photogrammetry": photogrammetry}
