@@ -199,9 +199,7 @@ def pcl_row(arguments, kind, seed, count):
         peer.prepare(types.SimpleNamespace(points=p, normals=n))
         for p, n in ((surface[kept], normals[kept]), (thin, np.zeros_like(thin)))
     ]
-    answer = peer.ask(
-        b"t" + struct.pack("<III", clouds[0]["index"], clouds[1]["index"], seed)
-    )
+    answer = peer.ask(b"t" + struct.pack("<III", clouds[0]["index"], clouds[1]["index"], seed))
     seconds = time.perf_counter() - begin
     peer.child.stdin.close()
     peer.child.wait()
@@ -247,6 +245,7 @@ def figures(rows, threshold=0.5):
     reported = [p for p in poses if p[0] >= threshold]
     return {
         "scenes": len(rows),
+        "scenes_with": sum(any(s >= VISIBLE for s in r["visible"]) for r in rows),
         "visible": visible,
         "recall_at_p95": float(seen[precise[-1]] / visible) if precise and visible else 0.0,
         "recall": sum(v for _, _, v in reported) / visible if visible else float("nan"),
