@@ -408,9 +408,12 @@ def register(
         if voxel_size is not None:
             options.voxel_size = number_of(voxel_size, "voxel_size")
         else:
-            # Of a source in another unit nothing follows for the target's.
-            asked = [(source, "source"), (target, "target")][ends is not None :]
-            found = _core.suggest_voxel_size([host_points(cloud, name) for cloud, name in asked])
+            asked = [host_points(target, "target")]
+            # Of a source in an unknown unit nothing follows for the target's.
+            if ends is None or ends[0] == ends[1] > 0:
+                of_source = host_points(source, "source")
+                asked.insert(0, of_source if ends is None else of_source * np.float32(ends[0]))
+            found = _core.suggest_voxel_size(asked)
             if found.voxel_size > 0:  # else there is nothing to align, in voxels of any size
                 options.voxel_size = found.voxel_size
         if quality is not None:

@@ -72,6 +72,15 @@ def test_a_known_scale_is_that_of_register():
     assert known.confidence == plain.confidence
 
 
+def test_a_known_scale_asks_both_clouds_for_the_voxel_size():
+    a, b = _room(1), _room(2)
+    part = b[b[:, 0] < 1]
+    plain = gpureg.register(a, part)
+    assert plain.voxel_size > gpureg.suggest_voxel_size(part).voxel_size
+    known = gpureg.register(a / 4, part, scale=4)
+    assert known.result.voxel_size == plain.voxel_size
+
+
 @pytest.mark.parametrize("scale", [0, -1, float("nan"), float("inf"), (0, 1), (2, 1), (1, np.nan)])
 def test_wrong_scales_are_named(scale):
     with pytest.raises(gpureg.InvalidArgument, match="scale"):
