@@ -68,6 +68,16 @@ void bind_scale(py::module_& m) {
       },
       py::arg("context"), py::arg("clouds"), py::arg("pairs"), py::arg("least"), py::arg("most"),
       py::arg("options"), py::arg("names") = std::vector<std::string>());
+  m.def(
+      "align_scaled_auto",
+      [](const Context& context, const py::handle source, const py::handle target, double least,
+         double most, const RegistrationOptions options) {
+        const Input a(source.cast<py::tuple>()), b(target.cast<py::tuple>());
+        return interruptible(
+            [&] { return align_scaled_auto(context, a.view, b.view, {least, most}, options); });
+      },
+      py::arg("context"), py::arg("source"), py::arg("target"), py::arg("least"), py::arg("most"),
+      py::arg("options"));
 }
 
 }  // namespace gpureg::python

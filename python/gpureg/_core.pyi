@@ -627,6 +627,14 @@ def align_scaled_batch(
     options: RegistrationOptions,
     names: list[str] = ...,
 ) -> list[ScaledResult]: ...
+def align_scaled_auto(
+    context: Context,
+    source: Any,
+    target: Any,
+    least: float,
+    most: float,
+    options: RegistrationOptions,
+) -> ScaledResult: ...
 def align_within(
     context: Context,
     source: PreparedCloud,

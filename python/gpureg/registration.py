@@ -403,17 +403,15 @@ def register(
         raise TypeError("time_budget_ms: give either a time budget or a quality")
     if time_budget_ms is not None:
         time_budget_ms = milliseconds_of(time_budget_ms, "time_budget_ms")
+    automatic = options is None and voxel_size is None
     if options is None:
         options = RegistrationOptions()
         if voxel_size is not None:
             options.voxel_size = number_of(voxel_size, "voxel_size")
         else:
-            asked = [host_points(target, "target")]
-            # Of a source in an unknown unit nothing follows for the target's.
-            if ends is None or ends[0] == ends[1] > 0:
-                of_source = host_points(source, "source")
-                asked.insert(0, of_source if ends is None else of_source * np.float32(ends[0]))
-            found = _core.suggest_voxel_size(asked)
+            # Where the scale is searched, align_scaled_auto() chooses it; meshes need one before.
+            asked = [(source, "source"), (target, "target")][ends is not None :]
+            found = _core.suggest_voxel_size([host_points(cloud, name) for cloud, name in asked])
             if found.voxel_size > 0:  # else there is nothing to align, in voxels of any size
                 options.voxel_size = found.voxel_size
         if quality is not None:
@@ -429,6 +427,8 @@ def register(
     ):
         clouds.append(core_cloud(cloud, None, None, viewpoint, options, name, device))
     options.validate()
+    if ends is not None and automatic:
+        return _core.align_scaled_auto(context, *clouds, *ends, options)
     if ends is not None:
         return _core.align_scaled_batch(
             context, clouds, [(0, 1)], *ends, options, ["source", "target"]

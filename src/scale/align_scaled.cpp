@@ -11,6 +11,8 @@
 #include "common/stop_scope.hpp"
 #include "common/validate.hpp"
 #include "gpureg/registration/scale.hpp"
+#include "gpureg/voxel_size.hpp"
+#include "scale/ladder.hpp"
 #include "scale/scale_search.hpp"
 
 namespace gpureg {
@@ -24,6 +26,11 @@ void check(const ScaleRange& range, const RegistrationSettings& options) {
   require(options.prepare.voxel_size > 0, "prepare.downsample", "false",
           "true where the scale is searched");
 }
+
+/// The second search looks this far about the scale of the first, as a factor, and is made if its
+/// voxels differ by more than a tenth.
+constexpr double kNear = 1.05;
+constexpr float kOtherVoxel = 0.1f;
 
 ScaledResult of_known(RegistrationResult&& result, double scale) {
   ScaledResult out;
@@ -176,6 +183,46 @@ ScaledResult align_scaled(const Context& context, const PointCloudView& source,
   return align_scaled_batch(context, {source, target}, {{0, 1}}, range, options, {},
                             {"source", "target"})
       .front();
+}
+
+ScaledResult align_scaled_auto(const Context& context, const PointCloudView& source,
+                               const PointCloudView& target, const ScaleRange& range,
+                               const RegistrationOptions& given) {
+  range.validate();
+  RegistrationOptions options = given;
+  const auto suggested_at = [&](double scale) {
+    const scale::ScaledCloud scaled(source, scale);
+    return suggest_voxel_size({scaled.view(), target});
+  };
+  for (std::size_t k = 0; k < 2; ++k)
+    naming_cloud({"source", "target"}, 2, k, [&] { (k == 0 ? source : target).validate(); });
+  // Of a source in an unknown unit nothing follows for the target's.
+  const VoxelSizeSuggestion suggestion =
+      range.is_known() ? suggested_at(range.least) : suggest_voxel_size({target});
+  if (suggestion.valid()) options.voxel_size = suggestion.voxel_size;
+  ScaledResult first = align_scaled(context, source, target, range, options);
+  if (first.scale_status != ScaleStatus::found) return first;
+  const VoxelSizeSuggestion of_both = suggested_at(first.scale);
+  if (!of_both.valid() || std::abs(of_both.voxel_size / options.voxel_size - 1) <= kOtherVoxel)
+    return first;
+  options.voxel_size = of_both.voxel_size;
+  const ScaleRange near{
+      std::max(range.least, first.scale / kNear),
+      range.is_free() ? first.scale * kNear : std::min(range.most, first.scale * kNear)};
+  ScaledResult second = align_scaled(context, source, target, near, options);
+  if (second.scale_status == ScaleStatus::none) return first;
+  // Finer voxels judge better, but a viewpoint that only one of the searches believes in may be
+  // wrong.
+  const bool same_viewpoints = first.result.source_viewpoint == second.result.source_viewpoint &&
+                               first.result.target_viewpoint == second.result.target_viewpoint;
+  if (!same_viewpoints && second.result.symmetry_confidence() <= first.result.symmetry_confidence())
+    return first;
+  for (const ScaleCandidate& other : first.candidates)
+    if (other.scale < near.least || other.scale > near.most) second.candidates.push_back(other);
+  std::stable_sort(
+      second.candidates.begin(), second.candidates.end(),
+      [](const ScaleCandidate& a, const ScaleCandidate& b) { return a.confidence > b.confidence; });
+  return second;
 }
 
 }  // namespace gpureg

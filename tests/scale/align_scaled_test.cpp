@@ -7,6 +7,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/registration/scale.hpp"
+#include "gpureg/voxel_size.hpp"
 #include "support/expect_error.hpp"
 #include "support/result_bytes.hpp"
 #include "support/scan.hpp"
@@ -55,6 +56,37 @@ class UnknownScale : public testing::Test {
   std::vector<Eigen::Vector3f> source, target;
   Eigen::Isometry3d truth;
 };
+
+TEST_F(UnknownScale, AutoTakesTheVoxelSizeThatBothCloudsSuggest) {
+  // Of half of the room alone the voxels would be others.
+  std::vector<Eigen::Vector3f> half;
+  for (const Eigen::Vector3f& p : target)
+    if (p.x() < 1) half.push_back(p);
+  const auto scaled = times(1 / 3.0, source);
+  const PointCloudView a(scaled), b(half);
+  const float alone = suggest_voxel_size({b}).voxel_size;
+  const ScaledResult result = align_scaled_auto(context, a, b, {2, 5});
+  expect_truth(result, 3);
+  EXPECT_GT(result.result.voxel_size, 1.1f * alone);
+  const ScaledResult first = align_scaled(context, a, b, {2, 5}, RegistrationOptions{alone}),
+                     second = align_scaled(context, a, b, {first.scale / 1.05, first.scale * 1.05},
+                                           RegistrationOptions{result.result.voxel_size});
+  EXPECT_EQ(test::bytes(result.result), test::bytes(second.result));
+}
+
+TEST_F(UnknownScale, AutoWithAKnownScaleIsRegistrationOfBoth) {
+  const PointCloudView a(source), b(target);
+  const ScaledResult known = align_scaled_auto(context, a, b, ScaleRange::known(1));
+  EXPECT_EQ(known.scale_status, ScaleStatus::known);
+  EXPECT_EQ(test::bytes(known.result), test::bytes(align(context, a, b)));
+}
+
+TEST_F(UnknownScale, AutoSaysWhatIsWrong) {
+  const PointCloudView a(source), b(target);
+  EXPECT_THROW(align_scaled_auto(context, a, b, {5, 2}), InvalidArgument);
+  EXPECT_FALSE(align_scaled_auto(context, PointCloudView(), b).aligned());
+  EXPECT_FALSE(align_scaled_auto(context, a, PointCloudView()).aligned());
+}
 
 TEST_F(UnknownScale, IsFound) {
   const auto scaled = times(1 / 0.05, source);

@@ -370,11 +370,16 @@ int run(RegisterOptions o) {
   } else {
     o.method.choose_voxel_size({target_cloud.view()}, o.target);
   }
-  const RegistrationOptions options = o.method.registration();
+  RegistrationOptions options = o.method.registration();
   o.method.note_calibration();
   if (!scale.is_known()) {
-    o.scaled = align_scaled(context, o.source_viewpoint.view(source_cloud),
-                            o.target_viewpoint.view(target_cloud), scale, options);
+    o.scaled = (o.method.automatic_voxel_size ? align_scaled_auto : align_scaled)(
+        context, o.source_viewpoint.view(source_cloud), o.target_viewpoint.view(target_cloud),
+        scale, options);
+    if (o.method.automatic_voxel_size && o.scaled->result.voxel_size > 0) {
+      o.method.voxel_size = o.scaled->result.voxel_size;
+      options = o.method.registration();
+    }
     // Without a scale, the report counts points at that of equal extents.
     const double none = extent_of(target_cloud.points) / extent_of(source_cloud.points);
     scale_cloud(source_cloud, o.scaled->scale_status != ScaleStatus::none ? o.scaled->scale

@@ -87,6 +87,15 @@ ScaledResult align_scaled(const Context& context, const PointCloudView& source,
                           const PointCloudView& target, const ScaleRange& range = {},
                           const RegistrationOptions& options = {});
 
+/// align_scaled() with voxel sizes that follow from the clouds: that of the target, and once a
+/// scale is found, a search within a twentieth of it in the voxels that both clouds suggest there.
+/// Its result counts, or the more confident one where the two believe in different viewpoints;
+/// other scales stay candidates. RegistrationResult::voxel_size is that of the result.
+/// @param options their voxel size counts only where suggest_voxel_size() has none.
+ScaledResult align_scaled_auto(const Context& context, const PointCloudView& source,
+                               const PointCloudView& target, const ScaleRange& range = {},
+                               const RegistrationOptions& options = {});
+
 /// Callbacks of align_scaled_batch(), on the calling thread; either may be empty.
 struct ScaledCallbacks {
   /// Receives each pair once when it is finished; pairs of one source come together.

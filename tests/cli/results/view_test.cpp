@@ -49,9 +49,9 @@ TEST_F(View, PairsOfABatchByConfidenceWithPictures) {
 
   std::filesystem::rename(scans_ / "cloud_bin_0.ply", out_ / "elsewhere.ply");
   EXPECT_EQ(run({"view", result, "--print"}).status, 2) << "a picture lacks its cloud";
-  auto json = json_of(result);
-  json["folder"] = out_ / "gone";
-  out_.write("r.json", json.dump());
+  auto written = json_of(result);
+  written["folder"] = out_ / "gone";
+  out_.write("r.json", written.dump());
   const Outcome without = run({"view", result, "--print"});
   EXPECT_EQ(without.status, 0);
   expect_holds(without.err, {"no pictures", "gone"});
