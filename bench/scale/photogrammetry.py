@@ -10,8 +10,9 @@ The true similarity is that from COLMAP's camera centres to the true ones. `trut
 `deviation` of its scale (jackknife, %), `surface`: by how much the cloud's points lie too far from their cameras after it
 (median, %), the `noise` of these distances (%), the share that is `off` by 5 % or more, and the share of the scan that
 the cloud has `covered`, within 0.1 m. An error of the scale below `deviation` and `surface` says nothing.
-Conditions: `known` scale; `free`; `given`: free, with cameras and scanners as viewpoints; `sized`: free, with the voxel
-size that both clouds suggest at the true scale; the others take the scan's. `none`: free, and the cloud has no viewpoint.
+Conditions: `known` scale; `free`, both with automatic voxels. Free in one search: `one` in the voxel size of the scan;
+`given`: with cameras and scanners as viewpoints, too; `none`: the cloud has no viewpoint; `sized`: in the voxel size that
+both clouds suggest at the true scale.
 A pose is `found` within 5 degrees and 0.2 m at the cloud's centre. `foreign`: the scan is of the next seed's place.
 
 usage: photogrammetry.py --cache FOLDER [--kinds room,flat,corner,house] [--seeds 1,2,3] [--output ROWS]
@@ -35,7 +36,7 @@ from record import commit, processor, save
 RECORD = ROOT / "bench/results/photogrammetry.json"
 EXIF_ERROR = 1.03  # of the focal length that the pictures say
 POINTS = 300_000  # of a photogrammetric cloud, at most
-CONDITIONS = ("known", "free", "given", "sized", "none")
+CONDITIONS = ("known", "free", "given", "sized", "none", "one")
 DEGREES, METRES = 5, 0.2  # of a pose that is found
 
 
@@ -252,6 +253,8 @@ def registered(gpureg, context, data, scan_of, rng, condition, truth):
     scale, turn, shift = truth
     true_scale = scale * size / factor
     voxel = None
+    if condition in ("one", "given", "none"):
+        voxel = gpureg.suggest_voxel_size([target]).voxel_size
     if condition == "sized":
         voxel = gpureg.suggest_voxel_size([source * true_scale, target]).voxel_size
     begin = time.perf_counter()
@@ -375,7 +378,8 @@ def main():
                         continue
                     if foreign and condition == "known":
                         continue
-                    rng = np.random.default_rng([seed, other, n, draw])
+                    draws_of = CONDITIONS.index("free") if condition == "one" else n
+                    rng = np.random.default_rng([seed, other, draws_of, draw])
                     row = {"kind": kind, "seed": seed, "draw": draw, "foreign": foreign}
                     row |= registered(gpureg, context, data, scan_of, rng, condition, truth)
                     row["found"] &= not foreign

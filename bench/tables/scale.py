@@ -78,9 +78,10 @@ PLACES = {
 SEARCHES = {
     "known": "scale known",
     "free": "`free`",
-    "given": "`free`, viewpoints given",
-    "sized": "`free`, voxel size of both clouds",
-    "none": "`free`, source viewpoint `none`",
+    "one": "`free`, one search, voxel size of the scan",
+    "given": "the same, viewpoints given",
+    "none": "the same, source viewpoint `none`",
+    "sized": "`free`, one search, voxel size of both clouds",
 }
 
 
@@ -90,7 +91,11 @@ def photogrammetry():
         "| pictures of | pairs | search | found, reported | scale within 1 % | error of the scale, %: median, largest | lowest confidence | foreign pairs: reported, highest confidence | s |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for g in record["groups"]:
+    order = list(PLACES), list(SEARCHES)
+    for g in sorted(
+        record["groups"],
+        key=lambda g: (order[0].index(g["kind"]), order[1].index(g["condition"])),
+    ):
         error = "-"
         if g["condition"] != "known" and g["found"]:
             error = f"{g['scale_error']:.2f}, {g['largest_scale_error']:.2f}"
