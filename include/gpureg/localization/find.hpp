@@ -80,7 +80,7 @@ struct FindResult {
   std::vector<FoundPart> doubtful;
   float voxel_size = 0;  ///< of the search, that was used
   /// Of the evidence: a quarter of it, or more where the points of the part or of the scene are far
-  /// apart. Confidences were fitted with an eightieth of the diameter.
+  /// apart, and half of it where the viewpoint of the scene is not known. 0: none was taken.
   float evidence_voxel_size = 0;
   double diameter = 0;                            ///< of the part: diagonal of its box
   double scene_extent = 0;                        ///< diagonal of the box of the scene

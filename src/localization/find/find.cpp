@@ -280,11 +280,6 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
     throw InvalidArgument("the points of the part are " + shown(of_part, 2) +
                           " apart, but it extends over " + shown(out.diameter, 3) +
                           " only: expected a fortieth of it or less, as points of a mesh have");
-  const double voxel = static_cast<double>(out.voxel_size);
-  const float fine = static_cast<float>(
-      std::max({voxel / kFineVoxels, kFineSpacings * spacing, kPartSpacings * of_part,
-                std::min(voxel / 2, kFinePartSpacings * of_part)}));
-  out.evidence_voxel_size = fine;
 
   // The search.
   RegistrationSettings registration = resolve(RegistrationOptions{out.voxel_size, options.quality});
@@ -311,7 +306,13 @@ FindResult find(const Context& context, const PointCloudView& part, const PointC
   registration.prepare.surface_side_distance = 0;
   registration.evidence.degeneracy_search_distance = 0;  // the evidence below tells better
 
-  // The evidence.
+  // The evidence. Where the viewpoint is not known nothing tells outlines: half a voxel.
+  const double voxel = static_cast<double>(out.voxel_size);
+  const double finest = searched.viewpoints.empty() ? voxel / 2 : voxel / kFineVoxels;
+  const float fine =
+      static_cast<float>(std::max({finest, kFineSpacings * spacing, kPartSpacings * of_part,
+                                   std::min(voxel / 2, kFinePartSpacings * of_part)}));
+  out.evidence_voxel_size = fine;
   const PartSurface surface = surface_of(context, outer, 0.7f * fine, threads);
   if (surface.points.size() < kFewestPoints) return ended(FindStatus::too_few_part_points);
   const PreparedCloud fine_scene = prepared_surface(context, scene, fine, true);
