@@ -428,7 +428,7 @@ def register(
         clouds.append(core_cloud(cloud, None, None, viewpoint, options, name, device))
     options.validate()
     if ends is not None and automatic:
-        return _core.align_scaled_auto(context, *clouds, *ends, options)
+        return _core.align_scaled_auto(context, clouds[0], clouds[1], *ends, options)
     if ends is not None:
         return _core.align_scaled_batch(
             context, clouds, [(0, 1)], *ends, options, ["source", "target"]
