@@ -26,7 +26,8 @@ import time
 import gpureg
 import numpy as np
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
+BENCH = pathlib.Path(__file__).resolve().parents[1]
+sys.path += [str(BENCH / "accuracy"), str(BENCH / "peers")]
 import viewpoints
 from record import commit, plain_parser, save
 
@@ -167,19 +168,11 @@ def run(name, scenes, limit, seed, condition, context):
 
 
 def teaser(p, q, noise, free):
-    """Similarity, scale, seconds of TEASER++ with matches from p to q, as its examples call it."""
-    import teaserpp_python
+    """Similarity, scale, seconds of TEASER++ with matches from p to q."""
+    from methods.teaser import solve
 
-    solver = teaserpp_python.RobustRegistrationSolver
-    parameters = solver.Params()
-    parameters.cbar2, parameters.noise_bound, parameters.estimate_scaling = 1, noise, free
-    parameters.rotation_estimation_algorithm = solver.ROTATION_ESTIMATION_ALGORITHM.GNC_TLS
-    parameters.rotation_gnc_factor, parameters.rotation_max_iterations = 1.4, 100
-    parameters.rotation_cost_threshold = 1e-12
-    of_pair = solver(parameters)
     begin = time.perf_counter()
-    of_pair.solve(p.T.astype(float), q.T.astype(float))
-    found, pose = of_pair.getSolution(), np.eye(4)
+    found, pose = solve(p, q, noise, free).getSolution(), np.eye(4)
     scale = found.scale if free else 1.0
     pose[:3, :3], pose[:3, 3] = scale * found.rotation, np.ravel(found.translation)
     return pose, scale, time.perf_counter() - begin

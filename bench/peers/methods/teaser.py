@@ -9,6 +9,27 @@ from methods import VOXEL
 from methods.sc2_pcr import SecondOrder
 
 
+def solve(p, q, noise, scaled=False):
+    """Its solver after the motion from p to q, matched points, as its 3DMatch example calls it.
+
+    scaled: the motion has a scale, too."""
+    import teaserpp_python
+
+    parameters = teaserpp_python.RobustRegistrationSolver.Params()
+    parameters.cbar2 = 1
+    parameters.noise_bound = noise
+    parameters.estimate_scaling = scaled
+    parameters.rotation_estimation_algorithm = (
+        teaserpp_python.RobustRegistrationSolver.ROTATION_ESTIMATION_ALGORITHM.GNC_TLS
+    )
+    parameters.rotation_gnc_factor = 1.4
+    parameters.rotation_max_iterations = 100
+    parameters.rotation_cost_threshold = 1e-12
+    solver = teaserpp_python.RobustRegistrationSolver(parameters)
+    solver.solve(p.T.astype(np.float64), q.T.astype(np.float64))
+    return solver
+
+
 class Teaser(SecondOrder):
     label = "TEASER++"
     parameters = f"mutual FPFH matches, noise bound {VOXEL:g} m, GNC-TLS, as its 3DMatch example"
@@ -29,20 +50,7 @@ class Teaser(SecondOrder):
         mutual = np.flatnonzero(backward[forward] == np.arange(len(forward)))
         if len(mutual) < 4:
             return {"pose": None, "score": 0.0}
-        parameters = self.module.RobustRegistrationSolver.Params()
-        parameters.cbar2 = 1
-        parameters.noise_bound = VOXEL
-        parameters.estimate_scaling = False
-        parameters.rotation_estimation_algorithm = (
-            self.module.RobustRegistrationSolver.ROTATION_ESTIMATION_ALGORITHM.GNC_TLS
-        )
-        parameters.rotation_gnc_factor = 1.4
-        parameters.rotation_max_iterations = 100
-        parameters.rotation_cost_threshold = 1e-12
-        solver = self.module.RobustRegistrationSolver(parameters)
-        solver.solve(
-            source[0][mutual].T.astype(np.float64), target[0][forward[mutual]].T.astype(np.float64)
-        )
+        solver = solve(source[0][mutual], target[0][forward[mutual]], VOXEL)
         solution = solver.getSolution()
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = solution.rotation, np.asarray(solution.translation).reshape(3)
