@@ -68,7 +68,8 @@ void bind_find(py::module_& m) {
           "Of the search, that was used.")
       .def_property_readonly(
           "evidence_voxel_size", [](const R& r) { return shortest(r.evidence_voxel_size); },
-          "Of the evidence: a quarter of it, or more where points are far apart.")
+          "Of the evidence: a quarter of it, or more where points are far apart, and half of it "
+          "where the viewpoint of the scene is not known.")
       .def_readonly("diameter", &R::diameter, "Of the part: diagonal of its box.")
       .def_readonly("scene_extent", &R::scene_extent, "Diagonal of the box of the scene.")
       .def_readonly("part_points", &R::part_points, "Prepared points of the part.")

@@ -8,6 +8,15 @@
 
 namespace gpureg::python {
 
+namespace {
+/// A cloud in host memory.
+Input on_host(const py::handle cloud) {
+  Input out(cloud.cast<py::tuple>());
+  if (out.on_device) throw py::type_error("clouds on a device: not with a scale that is searched");
+  return out;
+}
+}  // namespace
+
 void bind_scale(py::module_& m) {
   using S = ScaledResult;
   py::class_<S>(m, "ScaledResult", "A similarity: result of an alignment with unknown scale.")
@@ -55,9 +64,7 @@ void bind_scale(py::module_& m) {
         std::vector<Input> inputs;
         std::vector<PointCloudView> views;
         for (const py::handle cloud : clouds) {
-          inputs.emplace_back(cloud.cast<py::tuple>());
-          if (inputs.back().on_device)
-            throw py::type_error("clouds on a device: not with a scale that is searched");
+          inputs.push_back(on_host(cloud));
           views.push_back(inputs.back().view);
         }
         std::vector<Pair> entries;
@@ -72,7 +79,7 @@ void bind_scale(py::module_& m) {
       "align_scaled_auto",
       [](const Context& context, const py::handle source, const py::handle target, double least,
          double most, const RegistrationOptions options) {
-        const Input a(source.cast<py::tuple>()), b(target.cast<py::tuple>());
+        const Input a = on_host(source), b = on_host(target);
         return interruptible(
             [&] { return align_scaled_auto(context, a.view, b.view, {least, most}, options); });
       },

@@ -209,10 +209,10 @@ ScaledResult align_scaled_auto(const Context& context, const PointCloudView& sou
   const ScaleRange near{
       std::max(range.least, first.scale / kNear),
       range.is_free() ? first.scale * kNear : std::min(range.most, first.scale * kNear)};
+  if (near.least >= near.most) return first;  // refined to the end of the range, or beyond
   ScaledResult second = align_scaled(context, source, target, near, options);
   if (second.scale_status == ScaleStatus::none) return first;
-  // Finer voxels judge better, but a viewpoint that only one of the searches believes in may be
-  // wrong.
+  // The second is the better judge, but a viewpoint that only one of the two inferred may be wrong.
   const bool same_viewpoints = first.result.source_viewpoint == second.result.source_viewpoint &&
                                first.result.target_viewpoint == second.result.target_viewpoint;
   if (!same_viewpoints && second.result.symmetry_confidence() <= first.result.symmetry_confidence())

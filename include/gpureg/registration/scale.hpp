@@ -89,9 +89,10 @@ ScaledResult align_scaled(const Context& context, const PointCloudView& source,
 
 /// align_scaled() with voxel sizes that follow from the clouds: that of the target, and once a
 /// scale is found, a search within a twentieth of it in the voxels that both clouds suggest there.
-/// Its result counts, or the more confident one where the two believe in different viewpoints;
-/// other scales stay candidates. RegistrationResult::voxel_size is that of the result.
+/// Its result counts, or the more confident one where the two searches inferred different
+/// viewpoints; other scales stay candidates. RegistrationResult::voxel_size is that of the result.
 /// @param options their voxel size counts only where suggest_voxel_size() has none.
+/// @throws as align_scaled().
 ScaledResult align_scaled_auto(const Context& context, const PointCloudView& source,
                                const PointCloudView& target, const ScaleRange& range = {},
                                const RegistrationOptions& options = {});
