@@ -29,7 +29,7 @@ void check(const ScaleRange& range, const RegistrationSettings& options) {
 
 /// The second search looks this far about the scale of the first, as a factor, and is made if its
 /// voxels differ by more than a tenth.
-constexpr double kNear = 1.05;
+constexpr double kNearScale = 1.05;
 constexpr float kOtherVoxel = 0.1f;
 
 ScaledResult of_known(RegistrationResult&& result, double scale) {
@@ -207,8 +207,8 @@ ScaledResult align_scaled_auto(const Context& context, const PointCloudView& sou
     return first;
   options.voxel_size = of_both.voxel_size;
   const ScaleRange near{
-      std::max(range.least, first.scale / kNear),
-      range.is_free() ? first.scale * kNear : std::min(range.most, first.scale * kNear)};
+      std::max(range.least, first.scale / kNearScale),
+      range.is_free() ? first.scale * kNearScale : std::min(range.most, first.scale * kNearScale)};
   if (near.least >= near.most) return first;  // refined to the end of the range, or beyond
   ScaledResult second = align_scaled(context, source, target, near, options);
   if (second.scale_status == ScaleStatus::none) return first;
