@@ -92,7 +92,7 @@ ScaledResult align_scaled(const Context& context, const PointCloudView& source,
 /// Its result counts, or the more confident one where the two searches inferred different
 /// viewpoints; other scales stay candidates. RegistrationResult::voxel_size is that of the result.
 /// @param options their voxel size counts only where suggest_voxel_size() has none.
-/// @throws as align_scaled().
+/// @throws Error as align_scaled().
 ScaledResult align_scaled_auto(const Context& context, const PointCloudView& source,
                                const PointCloudView& target, const ScaleRange& range = {},
                                const RegistrationOptions& options = {});
