@@ -3,8 +3,11 @@
 
 #include <pybind11/stl.h>
 
+#include <cstdio>
+
 #include "cloud_input.hpp"
 #include "interrupt.hpp"
+#include "matrix.hpp"
 
 namespace gpureg::python {
 
@@ -56,6 +59,50 @@ void bind_scale(py::module_& m) {
                py::repr(py::float_(s.scale)).cast<std::string>() + " (" +
                to_string(s.scale_status) + ")>";
       });
+  using V = ScaledVerification;
+  py::class_<V>(m, "ScaledVerification", "Evidence and confidence of one similarity.")
+      .def_property_readonly(
+          "target_from_source", [](const V& v) { return array_of(v.similarity()); },
+          "(4, 4): as given, or refined; the upper left 3 x 3 is the rotation times scale.")
+      .def_readonly("scale", &V::scale, "As given, or refined.")
+      .def_property_readonly(
+          "scale_status", [](const V& v) { return to_string(v.scale_status); },
+          "'known', 'found' (refined), 'not_observable' or 'none' (no surface in common).")
+      .def_readonly("scale_deviation", &V::scale_deviation, "As of ScaledResult.")
+      .def_property_readonly(
+          "information", [](const V& v) { return array_of(v.information); },
+          "(7, 7), as of ScaledResult.")
+      .def_property_readonly(
+          "confidence", [](const V& v) { return v.verification.confidence; },
+          "Probability that the similarity is correct.")
+      .def_readonly("verification", &V::verification,
+                    "PoseVerification of the source multiplied by scale: its pose is rigid.")
+      .def("__repr__", [](const V& v) {
+        char text[128];
+        std::snprintf(text, sizeof(text), "<gpureg.ScaledVerification, scale %g (%s), confidence %.3f>",
+                      v.scale, to_string(v.scale_status), v.verification.confidence);
+        return std::string(text);
+      });
+  m.def(
+      "verify_scaled",
+      [](const Context& context, const py::handle source, const py::handle target,
+         const py::array_t<double, py::array::c_style>& similarities,
+         const RegistrationOptions options, bool refine, bool search_alternatives) {
+        const Input a = on_host(source), b = on_host(target);
+        std::vector<UnalignedMatrix4d> given;
+        if (similarities.ndim() != 3 || similarities.shape(1) != 4 || similarities.shape(2) != 4)
+          throw py::type_error("similarities: not an array of 4 x 4 matrices");
+        for (py::ssize_t k = 0; k < similarities.shape(0); ++k)
+          given.emplace_back(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(
+              similarities.data() + 16 * k));
+        VerificationOptions verification;
+        verification.refine = refine;
+        verification.search_alternatives = search_alternatives;
+        return interruptible(
+            [&] { return verify_scaled_poses(context, a.view, b.view, given, options, verification); });
+      },
+      py::arg("context"), py::arg("source"), py::arg("target"), py::arg("similarities"),
+      py::arg("options"), py::arg("refine"), py::arg("search_alternatives"));
   m.def(
       "align_scaled_batch",
       [](const Context& context, const py::sequence& clouds,

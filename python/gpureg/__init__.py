@@ -70,6 +70,7 @@ from ._core import (
     RegistrationResult,
     RegistrationStatistics,
     ScaledResult,
+    ScaledVerification,
     SolverOptions,
     StageTimings,
     StoredScan,
@@ -103,7 +104,7 @@ from .registration import (
     register,
     suggest_voxel_size,
 )
-from .verification import verify
+from .verification import verify, verify_scaled
 
 if TYPE_CHECKING:
     from .batch import BatchRun, register_all
@@ -186,6 +187,7 @@ __all__ = [
     "RegistrationStatistics",
     "RiskThreshold",
     "ScaledResult",
+    "ScaledVerification",
     "SolverOptions",
     "StageTimings",
     "StoredScan",
@@ -225,5 +227,6 @@ __all__ = [
     "scans_in",
     "suggest_voxel_size",
     "verify",
+    "verify_scaled",
     "write_point_cloud",
 ]

@@ -504,6 +504,22 @@ class ScaledResult:
     @property
     def result(self) -> RegistrationResult: ...
 
+class ScaledVerification:
+    @property
+    def target_from_source(self) -> _Float64: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def scale_status(self) -> str: ...
+    @property
+    def scale_deviation(self) -> float: ...
+    @property
+    def information(self) -> _Float64: ...
+    @property
+    def confidence(self) -> float: ...
+    @property
+    def verification(self) -> PoseVerification: ...
+
 class TimedResult:
     @property
     def result(self) -> RegistrationResult: ...
@@ -635,6 +651,15 @@ def align_scaled_auto(
     most: float,
     options: RegistrationOptions,
 ) -> ScaledResult: ...
+def verify_scaled(
+    context: Context,
+    source: Any,
+    target: Any,
+    similarities: npt.NDArray[np.float64],
+    options: RegistrationOptions,
+    refine: bool,
+    search_alternatives: bool,
+) -> list[ScaledVerification]: ...
 def align_within(
     context: Context,
     source: PreparedCloud,
@@ -1676,8 +1701,17 @@ def reconstruct_set(
     results: list[RegistrationResult] | None,
     odometry: _Float64 | list[tuple[int, int, _Float64, _Float64 | None]],
     options: ReconstructOptions,
+    scales: list[float] | None,
     progress: Callable[[int, int, int], object] | None,
 ) -> dict[str, Any]: ...
+def find_scales(
+    context: Context,
+    fragments: FragmentSource,
+    least: float,
+    most: float,
+    options: RegistrationOptions,
+    progress: Callable[[int, int], object] | None,
+) -> list[tuple[float, int]]: ...
 
 class AuditRecord:
     @property

@@ -170,6 +170,15 @@ class Map:
         return self._scans
 
     @property
+    def scales(self) -> npt.NDArray[np.float64] | None:
+        """(N,) factors by which the fragments were multiplied, in the order of ``poses``: the map's
+        unit per unit of the fragment; None unless scales were unknown. Scans whose scale no pair
+        tells have a guess, and are in islands of their own.
+        """
+        scales = self._of._scales
+        return None if scales is None else np.asarray(scales, np.float64)
+
+    @property
     def edges(self) -> tuple[MapEdge, ...]:
         """Accepted and rejected edges."""
         return self._edges

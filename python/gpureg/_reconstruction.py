@@ -25,6 +25,7 @@ from ._core import (
 from ._map import Map
 from ._progress import Progress, Report, batch_progress
 from .fragments import FragmentSet, fragment_set, options_for
+from .registration import scale_range
 
 
 def reconstruct(
@@ -33,6 +34,7 @@ def reconstruct(
     *,
     results: Any = None,
     odometry: Any = None,
+    scale: Any = None,
     audit: bool = True,
     refine: bool = True,
     options: RegistrationOptions | None = None,
@@ -60,6 +62,10 @@ def reconstruct(
         ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
         count, a Redwood log of pairs, or tuples (source, target, target_from_source) of fragment
         numbers, with a 6x6 information matrix as a fourth entry if it is known.
+    scale : "free" or (least, most), optional
+        Each scan has an unknown scale of its own, see `Map.scales`; a range is that of any later
+        scan to an earlier one. Without results and journal; poses are those of the scaled scans,
+        and so is ``odometry``.
     audit : bool
         Ask the scans whether they contradict each other where the map puts them, and take edges
         out that cannot be right. Clouds are needed, and prepared if `results` are given.
@@ -111,29 +117,38 @@ def reconstruct(
     context = context_of(context)
     fragments = fragment_set(fragments)
     fragments.check_files()
+    if scale is not None and (results is not None or journal is not None):
+        raise TypeError("scale: not together with results or a journal")
     rows, values = _pair_results(fragments, pairs, results)
     known = next((value.voxel_size for value in values or () if value.voxel_size), 0)
     if known == 0 and journal is not None:
         known = _core.voxel_size_of_journal(os.fspath(journal))
+    found = None if scale is None else _find_scales(fragments, scale, options, context, progress)
+    source = fragments._core(fingerprints=journal is not None)
+    if found is not None:
+        fragments = fragments.scaled([s for s, _ in found])
     options = options_for(options, fragments, known)
     steps = _Steps(progress)
     try:
         made = _core.reconstruct_set(
             context,
-            fragments._core(fingerprints=journal is not None),
+            source,
             rows,
             values,
             _odometry(odometry, fragments),
             _core.ReconstructOptions(
                 options, map_options, audit_options, audit, refine, os.fspath(journal or "")
             ),
+            None if found is None else [s for s, _ in found],
             steps if progress else None,
         )
     finally:
         steps.close()
+    if found is not None:
+        fragments = fragments.scaled(made["scales"])
     unusable = made["unusable"]
     usable = fragments.without(unusable) if unusable else fragments
-    found = None if made["audit"] is None else Audit._of(made["audit"], usable.numbers)
+    audited = None if made["audit"] is None else Audit._of(made["audit"], usable.numbers)
     return Map(
         made["map"],
         usable,
@@ -141,9 +156,30 @@ def reconstruct(
         made["refinement"],
         fragments,
         unusable,
-        found,
+        audited,
         made["places_look_alike"],
     )
+
+
+def _find_scales(
+    fragments: FragmentSet,
+    scale: Any,
+    options: RegistrationOptions | None,
+    context: Context,
+    progress: Progress,
+) -> list[tuple[float, int]]:
+    """(scale, part) of each fragment."""
+    total = len(fragments) * (len(fragments) - 1) // 2
+    least, most = scale_range(scale)
+    with batch_progress(progress, "finding scales", total) as report:
+        return _core.find_scales(
+            context,
+            fragments._core(),
+            least,
+            most,
+            options or RegistrationOptions(),
+            None if report is None else lambda done, _: report(done),
+        )
 
 
 class _Steps:

@@ -40,6 +40,7 @@ class FragmentSet:
         sources: Sequence[Any],
         viewpoints: dict[int, Any] | None = None,
         names: Sequence[str] | None = None,
+        scales: Sequence[float] | None = None,
     ) -> None:
         if len(set(numbers)) != len(numbers):
             raise ValueError("numbers: one is there twice")
@@ -51,6 +52,9 @@ class FragmentSet:
         self._names = tuple(_names_of(self._numbers, sources) if names is None else names)
         if len(self._names) != len(self._numbers):
             raise ValueError(f"names: {len(self._names)} for {len(self._numbers)} fragments")
+        self._scales = None if scales is None else tuple(float(scale) for scale in scales)
+        if self._scales is not None and len(self._scales) != len(self._numbers):
+            raise ValueError(f"scales: {len(self._scales)} for {len(self._numbers)} fragments")
 
     @classmethod
     def from_directory(
@@ -138,7 +142,12 @@ class FragmentSet:
             [self._sources[k] for k in kept],
             self._viewpoints,
             [self._names[k] for k in kept],
+            None if self._scales is None else [self._scales[k] for k in kept],
         )
+
+    def scaled(self, scales: Sequence[float]) -> FragmentSet:
+        """The same fragments, each multiplied by its scale when it is loaded."""
+        return FragmentSet(self._numbers, self._sources, self._viewpoints, self._names, scales)
 
     def load(
         self, position: int, options: RegistrationOptions | MapOptions, device: bool = False
@@ -147,8 +156,11 @@ class FragmentSet:
         it is there. Thread-safe. Raises OSError for all that is wrong with a file.
         """
         source, number = self._sources[position], self._numbers[position]
+        if self._scales is not None:  # the spacing of meshes is in the fragment's unit
+            size = options.voxel_size / self._scales[position]
+            options, device = RegistrationOptions(voxel_size=size), False
         try:
-            return core_cloud(
+            cloud = core_cloud(
                 source,
                 None,
                 None,
@@ -157,6 +169,7 @@ class FragmentSet:
                 f"fragments[{position}]",
                 device,
             )
+            return cloud if self._scales is None else _times(self._scales[position], cloud)
         except ValueError as error:
             if isinstance(source, str | os.PathLike):
                 raise IoError(str(error)) from error
@@ -209,7 +222,9 @@ class FragmentSet:
         clouds, count = [], min(len(self), 8)
         for k in range(count):
             try:
-                clouds.append(host_points(self._sources[k * len(self) // count], "fragments"))
+                place = k * len(self) // count
+                points = host_points(self._sources[place], "fragments")
+                clouds.append(points if self._scales is None else points * self._scales[place])
             except (OSError, ValueError):
                 continue
         return _core.suggest_voxel_size(clouds).voxel_size or RegistrationOptions().voxel_size
@@ -272,6 +287,19 @@ class FragmentSet:
         if place is None:
             raise ValueError(f"pairs: there is no fragment named {word!r}")
         return self._numbers[place]
+
+
+def _times(scale: float, cloud: CoreCloud) -> CoreCloud:
+    """The cloud, which is on the host, with all its lengths multiplied."""
+    points, normals, features, viewpoints, origin, streams = cloud
+    return (
+        np.asarray(points * np.float32(scale)),
+        normals,
+        features,
+        viewpoints * np.float32(scale) if isinstance(viewpoints, np.ndarray) else viewpoints,
+        None if origin is None else origin * scale,
+        streams,
+    )
 
 
 def _names_of(numbers: Sequence[int], sources: Sequence[Any]) -> list[str]:

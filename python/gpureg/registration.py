@@ -226,7 +226,7 @@ def align_batch(
     return results
 
 
-def _scale_range(scale: Any) -> tuple[float, float]:
+def scale_range(scale: Any) -> tuple[float, float]:
     """(least, most) of a scale; (0, 0): free."""
     if isinstance(scale, str):
         if scale != "free":
@@ -282,7 +282,7 @@ def align_scaled_batch(
     (True, 2.0)
     """
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    least, most = _scale_range(scale)
+    least, most = scale_range(scale)
     clouds = several(clouds, "clouds")
     entries = index_pairs(pairs, "pairs", len(clouds))
     inputs = [
@@ -396,7 +396,7 @@ def register(
         raise TypeError("prior: not together with time_budget_ms")
     if scale is not None and not (prior is None and time_budget_ms is None):
         raise TypeError("scale: not together with a prior or time_budget_ms")
-    ends = None if scale is None else _scale_range(scale)
+    ends = None if scale is None else scale_range(scale)
     if options is not None and not (voxel_size is None and quality is None and seed is None):
         raise TypeError("options: give either options, or voxel_size, quality and seed")
     if time_budget_ms is not None and quality is not None:

@@ -6,11 +6,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import float64
+from ._arrays import core_cloud, float64
 from ._contexts import checked, context_of
-from ._core import Context, PoseVerification, RegistrationOptions
+from ._core import Context, PoseVerification, RegistrationOptions, ScaledVerification
 from .preparation import prepared
 
 
@@ -63,18 +64,81 @@ def verify(
     """
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     context = context_of(context)
-    matrices = float64(poses, "poses")
-    if matrices.ndim == 2:
-        matrices = matrices[None]
-    if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
-        raise ValueError(f"poses: expected shape (4, 4) or (K, 4, 4), got {np.shape(poses)}")
-    rows = np.abs(matrices[:, 3] - [0, 0, 0, 1]).max(axis=1, initial=0)
-    for k in np.flatnonzero(~(rows <= 1e-6)):
-        raise ValueError(
-            f"poses[{k}]: its last row is {matrices[k, 3].tolist()}, expected [0, 0, 0, 1]"
-        )
+    matrices = _matrices(poses, "poses")
     first, second = prepared([source, target], options, context, False)
     return _core.verify(context, first, second, matrices, options, refine, search_alternatives)
 
 
-__all__ = ["verify"]
+def verify_scaled(
+    source: Any,
+    target: Any,
+    similarities: Any,
+    *,
+    refine: bool = False,
+    search_alternatives: bool = True,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
+) -> list[ScaledVerification]:
+    """Verify similarities of another method: TEASER++, Umeyama's fit, a loop of a monocular run.
+
+    Those of other scales compete with each other. Scales that nobody proposes are not searched:
+    `register` with a scale does that.
+
+    Parameters
+    ----------
+    source, target : points, on the host
+        As for `register`; prepared with the options, the source at each scale.
+    similarities : (4, 4) or (K, 4, 4) array
+        p_target = M p_source; the upper left 3 x 3 of M is a rotation times the scale.
+    refine : bool
+        Refine every similarity, its scale too, before it is verified.
+    search_alternatives : bool
+        As for `verify`, at the scale of each similarity.
+    options : RegistrationOptions, optional
+        The voxel size is in the unit of the target.
+    context : Context, optional
+
+    Returns
+    -------
+    list of ScaledVerification
+        One for each, in their order.
+
+    Raises
+    ------
+    ValueError
+        Naming the matrix that is no similarity.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = np.random.default_rng(1).random((2000, 3))
+    >>> half = np.diag([0.5, 0.5, 0.5, 1])
+    >>> [v.confidence > 0.5 for v in gpureg.verify_scaled(2 * cloud, cloud, [half, np.eye(4)])]
+    [True, False]
+    """
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    context = context_of(context)
+    matrices = _matrices(similarities, "similarities")
+    clouds = [
+        core_cloud(cloud, None, None, None, options, name)
+        for cloud, name in ((source, "source"), (target, "target"))
+    ]
+    return _core.verify_scaled(context, *clouds, matrices, options, refine, search_alternatives)
+
+
+def _matrices(poses: Any, name: str) -> npt.NDArray[np.float64]:
+    """(K, 4, 4), each with a last row of 0, 0, 0, 1."""
+    matrices = float64(poses, name)
+    if matrices.ndim == 2:
+        matrices = matrices[None]
+    if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
+        raise ValueError(f"{name}: expected shape (4, 4) or (K, 4, 4), got {np.shape(poses)}")
+    rows = np.abs(matrices[:, 3] - [0, 0, 0, 1]).max(axis=1, initial=0)
+    for k in np.flatnonzero(~(rows <= 1e-6)):
+        raise ValueError(
+            f"{name}[{k}]: its last row is {matrices[k, 3].tolist()}, expected [0, 0, 0, 1]"
+        )
+    return matrices
+
+
+__all__ = ["verify", "verify_scaled"]

@@ -6,30 +6,15 @@
 #include <optional>
 
 #include "api/access.hpp"
-#include "api/frames.hpp"
 #include "api/with_settings.hpp"
 #include "common/for_each_on.hpp"
+#include "scale/limits.hpp"
 
 namespace gpureg::scale {
 namespace {
 
-/// Correspondences of the refinement of the scale, in correspondence distances: it starts a few per
-/// cent off.
-constexpr float kReach = 2;
-/// The same for the source, whose scale may be smaller than that of its points.
-constexpr float kReachOfSource = 1.5f * kReach;
-/// A scale that refinement changes by less is not prepared again.
-constexpr double kSettled = 0.002;
-/// Largest change that refinement may make: beyond, it has lost the pose. From a sixth off it still
-/// finds the scale.
-constexpr double kMostChange = 0.3;
-constexpr int kRounds = 3;
 /// Confidence as a share of that of the first, below which a scale is not refined.
 constexpr double kLeastChance = 0.05;
-/// Scales whose difference is no ambiguity.
-constexpr double kSameScale = 0.03;
-/// RefinedScale::stiffness below which the scale is not observable.
-constexpr double kLeastStiffness = 0.1;
 /// Odds of another scale, as a share of those of the first, that make the pair ambiguous.
 constexpr double kRivalOdds = 0.5;
 
@@ -71,16 +56,10 @@ std::vector<Trial> tried(const Context& context, const PreparedLadder& source,
     trial.scale = scales[k];
     trial.result = std::move(results[k]);
     if (!trial.result.has_pose()) return;
-    const PreparedState &s = *Access::state(prepared[k]), &t = *Access::state(target.cloud);
-    const Pose<double> local =
-        local_from_rows(rows_from_frames(trial.result.target_from_source, s, t), s, t);
-    UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
-    pose.linear() = Eigen::Quaterniond(local.w, local.x, local.y, local.z).toRotationMatrix();
-    pose.translation() = Eigen::Vector3d(local.tx, local.ty, local.tz);
-    PointsAndNormals points = s.copy_points_and_normals();
-    const ClosestSurface surface(std::move(points.points), std::move(points.normals),
-                                 kReachOfSource * options.prepare.max_correspondence_distance);
-    trial.refined = refine_scale(surface, target.surface, pose, options.refine.kernel_width);
+    const PreparedSurface surface(
+        prepared[k], kReachOfSource * options.prepare.max_correspondence_distance);
+    trial.refined = refine_scale(surface, target.surface, trial.result.target_from_source,
+                                 options.refine.kernel_width);
   });
   return out;
 }
@@ -129,16 +108,14 @@ void settle(const Context& context, const PreparedLadder& source, const Prepared
   keep_distinct(range, trials);
 }
 
-double odds(double confidence) { return confidence / std::max(1e-9, 1 - confidence); }
-
 /// Scales are exclusive: the first gets no more than its share of the odds.
 void share_odds(const std::vector<Trial>& trials, ScaledResult& out) {
   double sum = 0, rival = 0;
   for (const Trial& trial : trials) {
-    sum += odds(trial.confidence());
-    if (&trial != &trials.front()) rival = std::max(rival, odds(trial.confidence()));
+    sum += odds_of(trial.confidence());
+    if (&trial != &trials.front()) rival = std::max(rival, odds_of(trial.confidence()));
   }
-  const double first = odds(trials.front().confidence()), before = trials.front().confidence();
+  const double first = odds_of(trials.front().confidence()), before = trials.front().confidence();
   if (!(sum > first) || !(before > 0)) return;
   const double after = std::min(before, first / sum);
   if (rival > kRivalOdds * first) out.scale_status = ScaleStatus::ambiguous;
@@ -198,15 +175,6 @@ PrepareSettings search_options(const PreparedCloud& target, const RegistrationSe
   return out;
 }
 
-namespace {
-
-ClosestSurface surface_of(const PreparedCloud& cloud, float distance) {
-  PointsAndNormals points = Access::state(cloud)->copy_points_and_normals();
-  return {std::move(points.points), std::move(points.normals), distance};
-}
-
-}  // namespace
-
 PreparedTarget::PreparedTarget(const Context& context, const PointCloudView& target,
                                const RegistrationSettings& options)
     : cloud(prepare(context, target, options.prepare)),
@@ -214,7 +182,7 @@ PreparedTarget::PreparedTarget(const Context& context, const PointCloudView& tar
       coarse(search.voxel_size == options.prepare.voxel_size ? cloud
                                                              : prepare(context, target, search)),
       points(Access::state(coarse)->copy_points_and_normals()),
-      surface(surface_of(cloud, kReach * options.prepare.max_correspondence_distance)) {}
+      surface(cloud, kReach * options.prepare.max_correspondence_distance) {}
 
 ScaledResult search_scale(const Context& context, const PreparedLadder& source,
                           const PreparedTarget& target, const ScaleRange& range,

@@ -7,7 +7,7 @@
 #include "gpureg/registration/scale.hpp"
 #include "pipeline/prepared_state.hpp"
 #include "scale/ladder.hpp"
-#include "scale/refine.hpp"
+#include "scale/prepared_surface.hpp"
 #include "settings/settings.hpp"
 
 namespace gpureg::scale {
@@ -43,7 +43,7 @@ struct PreparedTarget {
   PrepareSettings search;   ///< see search_options()
   PreparedCloud coarse;     ///< prepared with them
   PointsAndNormals points;  ///< of coarse
-  ClosestSurface surface;   ///< of cloud
+  PreparedSurface surface;  ///< of cloud
 
   PreparedTarget(const Context& context, const PointCloudView& target,
                  const RegistrationSettings& options);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gpureg/registration.hpp"
+#include "gpureg/verification.hpp"
 
 /// Registration of clouds whose scales differ by an unknown factor: photogrammetry, monocular
 /// reconstruction, models in unknown units.
@@ -117,5 +118,37 @@ std::vector<ScaledResult> align_scaled_batch(const Context& context,
                                              const RegistrationOptions& options = {},
                                              const ScaledCallbacks& callbacks = {},
                                              const std::vector<std::string>& names = {});
+
+/// 4x4 without alignment, as UnalignedIsometry3d.
+using UnalignedMatrix4d = Eigen::Matrix<double, 4, 4, Eigen::DontAlign>;
+
+/// Verdict on one similarity of a pair.
+struct ScaledVerification {
+  double scale = 1;  ///< as given, or refined
+  /// known: as given; found: refined; not_observable: the surfaces in common fit at other scales,
+  /// too; none: the clouds have no surface in common at this pose.
+  ScaleStatus scale_status = ScaleStatus::none;
+  double scale_deviation = 0;  ///< as of ScaledResult; of a given scale, too
+  /// As of ScaledResult.
+  Eigen::Matrix<double, 7, 7> information = Eigen::Matrix<double, 7, 7>::Zero();
+  /// Of the source multiplied by `scale`: the pose is rigid.
+  PoseVerification verification;
+
+  /// @return as ScaledResult::similarity().
+  Eigen::Matrix4d similarity() const;
+};
+
+/// verify_poses() for similarities that another method proposes: TEASER++, the loop of a monocular
+/// run. Those of other scales compete with each other; scales that nobody proposes are not searched.
+/// @param similarities p_target = M * (p_source, 1), any number of them.
+/// @param options as for align_scaled().
+/// @param verification refine: the scale, too, with the pose.
+/// @return one entry for each, in their order. Deterministic, the same bits on every backend.
+/// @throws InvalidArgument naming the matrix that is no similarity; otherwise as prepare() and
+///   verify_poses(). Thread-safe.
+std::vector<ScaledVerification> verify_scaled_poses(
+    const Context& context, const PointCloudView& source, const PointCloudView& target,
+    const std::vector<UnalignedMatrix4d>& similarities, const RegistrationOptions& options = {},
+    const VerificationOptions& verification = {});
 
 }  // namespace gpureg

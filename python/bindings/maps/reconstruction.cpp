@@ -10,6 +10,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction/mend.hpp"
 #include "gpureg/reconstruction/reconstruct.hpp"
+#include "gpureg/reconstruction/scales.hpp"
 #include "interrupt.hpp"
 #include "maps/python_set.hpp"
 #include "matrix.hpp"
@@ -132,11 +133,30 @@ py::dict report_of(const RefineReport& report) {
   return out;
 }
 
-/// results: of the pairs; None: they are aligned. progress: called with (step, done, total).
+/// [(scale, part)] of each fragment. progress: called with (done, total).
+std::vector<std::pair<double, std::uint32_t>> scales_of(const Context& context, const PythonSet& set,
+                                                        double least, double most,
+                                                        const RegistrationOptions options,
+                                                        const py::object& progress) {
+  Teller tell(progress);
+  ScaleCallbacks callbacks;
+  callbacks.on_progress = [&](std::size_t done, std::size_t total) { tell(done, total); };
+  callbacks.should_stop = [&] { return !tell.check(); };
+  std::vector<std::pair<double, std::uint32_t>> out;
+  tell.run([&] {
+    for (const ScanScale& scan : find_scales(context, set, {least, most}, options, callbacks))
+      out.emplace_back(scan.scale, scan.part);
+  });
+  return out;
+}
+
+/// results: of the pairs; None: they are aligned. scales: of each fragment; None: 1. progress: called
+/// with (step, done, total).
 py::dict reconstruct_set(const Context& context, const PythonSet& set,
                          const std::optional<IndexArray>& pairs,
                          const std::optional<std::vector<RegistrationResult>>& results,
                          const py::object& odometry, const MapOptions options,
+                         const std::optional<std::vector<double>>& scales,
                          const py::object& progress) {
   MapInput input;
   if (pairs) input.pairs = pairs_of(*pairs);
@@ -149,8 +169,15 @@ py::dict reconstruct_set(const Context& context, const PythonSet& set,
   };
   callbacks.should_stop = [&] { return !tell.check(); };
   MapOfSet made;
-  tell.run([&] { made = reconstruct(context, set, input, options, callbacks); });
   py::dict out;
+  if (scales) {
+    ScaledMapOfSet scaled;
+    tell.run([&] { scaled = reconstruct(context, set, *scales, input, options, callbacks); });
+    out["scales"] = scaled.scales;
+    made = std::move(scaled.made);
+  } else {
+    tell.run([&] { made = reconstruct(context, set, input, options, callbacks); });
+  }
   out["scans"] = made.scans;
   out["unusable"] = dict_of(made.unusable);
   out["map"] = std::move(made.map);
@@ -262,7 +289,9 @@ void bind_reconstruction(py::module_& m) {
            py::arg("with_audit"), py::arg("with_refinement"), py::arg("journal"));
   m.def("reconstruct_set", &reconstruct_set, py::arg("context"), py::arg("fragments"),
         py::arg("pairs"), py::arg("results"), py::arg("odometry"), py::arg("options"),
-        py::arg("progress"));
+        py::arg("scales"), py::arg("progress"));
+  m.def("find_scales", &scales_of, py::arg("context"), py::arg("fragments"), py::arg("least"),
+        py::arg("most"), py::arg("options"), py::arg("progress"));
   bind_audit(m);
   bind_voxel_map(m);
 }
