@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
@@ -64,6 +66,41 @@ TEST(Scale, IsOfEachPairOfABatch) {
   EXPECT_NEAR(pair["scale"].get<double>(), 3, 0.03);
 }
 
+TEST(Scale, IsOfEachScanOfAMap) {
+  const TemporaryFolder folder, out;
+  const double factors[] = {1, 1.6, 0.9};
+  for (int k = 0; k < 3; ++k)
+    write_cloud(folder, "cloud_bin_" + std::to_string(k) + ".ply",
+                divided(room_scan(k), static_cast<float>(factors[k])));
+  const Outcome found = run(joined({"reconstruct", folder.path(), "-o", out.path(), "--scale",
+                                    "0.5:2", "--no-refine", "--quiet"},
+                                   kSmall));
+  EXPECT_EQ(found.status, 0) << found.out << found.err;
+  const nlohmann::json map = json_of(out / "reconstruction.json");
+  std::ifstream poses(out / "poses.txt");
+  for (std::size_t k = 0; k < 3; ++k) {
+    const nlohmann::json& scan = map["scans"][k];
+    EXPECT_TRUE(scan["placed"]);
+    EXPECT_NEAR(scan["scale"].get<double>() / factors[k], 1, 0.01);
+    EXPECT_NEAR(scale_of(scan["island_from_scan"]), scan["scale"].get<double>(), 1e-9);
+    int number = -1;
+    Eigen::Matrix4d pose;
+    poses >> number;
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column) poses >> pose(row, column);
+    EXPECT_EQ(number, static_cast<int>(k));
+    EXPECT_NEAR(std::cbrt(pose.topLeftCorner<3, 3>().determinant()),
+                scan["scale"].get<double>(), 1e-9);
+  }
+  for (const nlohmann::json& edge : map["edges"]) {
+    const auto scale = [&](const char* end) {
+      return map["scans"][edge[end].get<std::size_t>()]["scale"].get<double>();
+    };
+    EXPECT_NEAR(scale_of(edge["T_ij"]), scale("j") / scale("i"), 1e-9);
+  }
+  EXPECT_FALSE(std::filesystem::exists(out / "pairs.json"));  // of scaled scans
+}
+
 TEST(Scale, RefusesWhatIsNone) {
   const TemporaryFolder folder;
   const std::string a = write_cloud(folder, "a.ply", room_scan(0));
@@ -78,6 +115,11 @@ TEST(Scale, RefusesWhatIsNone) {
                  {"--scale is 0"});
   expect_refused({"batch", folder.path(), "-o", folder / "r.log", "--scale", "free", "--resume"},
                  {"--scale", "--resume"});
+  expect_refused({"reconstruct", folder.path(), "-o", folder / "map", "--scale", "2"},
+                 {"--scale is 2", "free or MIN:MAX"});
+  expect_refused({"reconstruct", folder.path(), "-o", folder / "map", "--scale", "free",
+                  "--odometry", "poses.txt"},
+                 {"--scale", "--odometry"});
 }
 
 }  // namespace

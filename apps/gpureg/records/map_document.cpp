@@ -67,8 +67,8 @@ Json map_document(const MapRun& run, const Context& context) {
          {"name", run.scene.scans[k].name},
          {"placed", scan.placed},
          {"island", scan.placed ? Json(scan.island) : Json(nullptr)},
-         {"island_from_scan",
-          scan.placed ? to_json(scan.island_from_scan.matrix()) : Json(nullptr)},
+         {"island_from_scan", scan.placed ? to_json(run.island_from_scan(k)) : Json(nullptr)},
+         {"scale", run.scale(k)},
          {"confidence", scan.confidence},
          {"reason", reconstruction::to_string(scan.reason)}});
   }
@@ -93,7 +93,8 @@ Json map_document(const MapRun& run, const Context& context) {
                              {"j", run.scene.numbers[edge.source]},
                              {"name_i", run.scene.scans[edge.target].name},
                              {"name_j", run.scene.scans[edge.source].name},
-                             {"T_ij", to_json(edge.target_from_source.matrix())},
+                             {"T_ij", to_json(run.of_files(edge.source, edge.target,
+                                                           edge.target_from_source))},
                              {"confidence", edge.confidence},
                              {"pair_confidence", edge.pair_confidence},
                              {"map_confidence", edge.map_confidence},
@@ -112,6 +113,11 @@ std::string map_summary(const MapRun& run, const Context& context) {
         << "pairs      " << run.made.pairs.size() << ", in " << fixed(run.made.seconds.align, 2)
         << " s (" << context.description() << ")\n";
   out << unusable_line(run.scene);
+  if (!run.scales.empty()) {
+    const auto [least, most] = std::minmax_element(run.scales.begin(), run.scales.end());
+    out << "scales     " << significant(*least, 4) << " to " << significant(*most, 4)
+        << ", in the poses\n";
+  }
   if (!run.made.map.odometry.empty())
     out << "odometry   " << run.made.map.odometry.size() << " poses\n";
   const std::size_t accepted = run.accepted_edges();

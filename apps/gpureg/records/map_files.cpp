@@ -12,6 +12,7 @@
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "inputs/cloud_file.hpp"
+#include "options/scale_option.hpp"
 #include "records/scan_table.hpp"
 #include "run/interrupt.hpp"
 #include "run/progress.hpp"
@@ -46,7 +47,7 @@ std::string poses_text(const MapRun& run, const reconstruction::Island& island) 
   std::string text;
   for (const std::uint32_t k : island.scans) {
     text += std::to_string(run.scene.numbers[k]) + "\n";
-    const Eigen::Matrix4d pose = run.made.map.scans[k].island_from_scan.matrix();
+    const Eigen::Matrix4d pose = run.island_from_scan(k);
     for (int row = 0; row < 4; ++row)
       for (int column = 0; column < 4; ++column) {
         append(text, pose(row, column));
@@ -85,9 +86,9 @@ void write_edges(const MapRun& run) {
     if (edge.accepted && run.made.map.scans[edge.source].placed)
       log.push_back({run.scene.numbers[edge.target], run.scene.numbers[edge.source],
                      run.scene.count(),
-                     (run.made.map.scans[edge.target].island_from_scan.inverse() *
-                      run.made.map.scans[edge.source].island_from_scan)
-                         .matrix()});
+                     run.of_files(edge.source, edge.target,
+                                  run.made.map.scans[edge.target].island_from_scan.inverse() *
+                                      run.made.map.scans[edge.source].island_from_scan)});
   evaluation::write_log(run.file("edges.log"), log);
 }
 
@@ -137,8 +138,10 @@ bool write_merged_maps(MapRun& run, float voxel_size, bool quiet) {
     reconstruction::VoxelMap map(voxel_size);
     for (const std::uint32_t scan : run.made.map.islands[k].scans) {
       if (InterruptGuard::requested()) return false;
-      const PointCloud cloud =
-          read_cloud(run.scene.scans[scan].path, mesh_spacing(voxel_size), MeshNote::none);
+      const double scale = run.scale(scan);
+      PointCloud cloud =
+          read_cloud(run.scene.scans[scan].path, mesh_spacing(voxel_size) / scale, MeshNote::none);
+      if (scale != 1) scale_cloud(cloud, scale);
       map.add(cloud.view(), run.made.map.scans[scan].island_from_scan);
       progress.update(++merged);
     }

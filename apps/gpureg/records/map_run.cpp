@@ -16,4 +16,18 @@ std::size_t MapRun::accepted_edges() const {
                     [](const reconstruction::Edge& edge) { return edge.accepted; }));
 }
 
+Eigen::Matrix4d MapRun::island_from_scan(std::size_t scan) const {
+  Eigen::Matrix4d out = made.map.scans[scan].island_from_scan.matrix();
+  out.topLeftCorner<3, 3>() *= scale(scan);
+  return out;
+}
+
+Eigen::Matrix4d MapRun::of_files(std::size_t source, std::size_t target,
+                                 const UnalignedIsometry3d& target_from_source) const {
+  Eigen::Matrix4d out = target_from_source.matrix();
+  out.topLeftCorner<3, 3>() *= scale(source);
+  out.topRows<3>() /= scale(target);
+  return out;
+}
+
 }  // namespace gpureg::cli

@@ -11,13 +11,14 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/reconstruction/reconstruct.hpp"
+#include "gpureg/reconstruction/scales.hpp"
 #include "inputs/odometry_file.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
 #include "options/resume_options.hpp"
+#include "options/scale_option.hpp"
 #include "pages/map_page.hpp"
 #include "records/map_document.hpp"
 #include "records/map_files.hpp"
@@ -37,6 +38,7 @@ struct ReconstructOptions {
   ScanInput input;
   std::string output, pairs = "all", results, odometry;
   MethodOptions method;
+  ScaleChoice scale;
   std::uint32_t prune = 0;
   pose_graph::DriftOptions drift;
   std::optional<float> map_voxel_size;
@@ -89,6 +91,18 @@ void choose_voxel_size(ReconstructOptions& o) {
   o.method.choose_voxel_size(o.input, o.resume.resume ? o.journal() : "");
 }
 
+/// What scales that are searched do not go with.
+void check_scale(const ReconstructOptions& o) {
+  if (!o.scale.given()) return;
+  if (o.scale.range().is_known())
+    throw InvalidArgument("--scale is " + o.scale.text +
+                          ", expected free or MIN:MAX: each scan of a map has a scale of its own");
+  for (const auto& [given, name] :
+       {std::pair(!o.results.empty(), "--results"), std::pair(!o.odometry.empty(), "--odometry"),
+        std::pair(o.resume.resume, "--resume"), std::pair(o.resume.restart, "--restart")})
+    if (given) throw InvalidArgument(std::string("--scale and ") + name + " do not go together");
+}
+
 /// Progress of each step of the library on stderr.
 class StepProgress {
  public:
@@ -118,7 +132,7 @@ class StepProgress {
 /// One run, from the folder to the map.
 class Reconstruct {
  public:
-  explicit Reconstruct(const ReconstructOptions& o)
+  explicit Reconstruct(ReconstructOptions& o)
       : o_(o),
         context_(o.method.context()),
         set_(FragmentFolder(o.input, o.quiet), o.quiet),
@@ -134,17 +148,19 @@ class Reconstruct {
     if (run_.aligned_here) o_.resume.check(o_.journal());
     const InterruptGuard guard;
     const reconstruction::MapInput known = input();
-    const reconstruction::MapOptions map_options = options();
     try {
-      o_.resume.with(o_.journal(), [&] {
-        run_.made = reconstruction::reconstruct(context_, set_, known, map_options, callbacks());
-      });
+      if (o_.scale.given())
+        reconstruct_scaled(known);
+      else
+        o_.resume.with(o_.journal(), [&] {
+          run_.made = reconstruction::reconstruct(context_, set_, known, options(), callbacks());
+        });
     } catch (const reconstruction::Cancelled&) {
       return say_interrupted();
     }
     progress_.end();
     if (!write_outputs()) return say_interrupted();
-    if (run_.made.journal) ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
+    if (run_.made.journal && !o_.scale.given()) ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
     if (!o_.quiet) {
       std::cout << "voxel size " << o_.method.voxel_size_text() << "\n";
       std::cout << map_summary(run_, context_);
@@ -154,6 +170,51 @@ class Reconstruct {
   }
 
  private:
+  /// Finds the scales of the scans, then makes the map of the scaled scans.
+  void reconstruct_scaled(const reconstruction::MapInput& known) {
+    reconstruction::ScaleCallbacks callbacks_of_search;
+    std::optional<Progress> progress;
+    callbacks_of_search.on_progress = [&](std::size_t done, std::size_t total) {
+      if (!progress) progress.emplace("finding scales", "pairs", total, o_.quiet);
+      progress->update(done);
+    };
+    callbacks_of_search.should_stop = InterruptGuard::requested;
+    const std::vector<reconstruction::ScanScale> found = reconstruction::find_scales(
+        context_, set_, o_.scale.range(), run_.options, callbacks_of_search);
+    progress.reset();
+    std::vector<double> scales;
+    for (const reconstruction::ScanScale& scan : found) scales.push_back(scan.scale);
+    choose_voxel_size_of(scales);
+    const auto guesses = std::count_if(found.begin(), found.end(),
+                                       [](const auto& scan) { return scan.part > 0; });
+    if (guesses > 0 && !o_.quiet)
+      std::cerr << "gpureg: note: no pair tells the scale of " << guesses << " of "
+                << found.size() << " scans to the first one" << std::endl;
+    reconstruction::MapOptions map_options = options();
+    map_options.journal.clear();
+    reconstruction::ScaledMapOfSet map = reconstruction::reconstruct(
+        context_, set_, scales, known, map_options, callbacks());
+    run_.made = std::move(map.made);
+    for (const std::size_t k : run_.made.scans) run_.scales.push_back(map.scales[k]);
+  }
+
+  /// That of some scaled scans.
+  void choose_voxel_size_of(const std::vector<double>& scales) {
+    if (!o_.method.automatic_voxel_size) return;
+    const reconstruction::ScaledFragments scaled(set_, scales);
+    constexpr std::size_t kMost = 8;
+    const std::size_t count = std::min(scaled.size(), kMost);
+    std::vector<LoadedCloud> clouds;
+    std::vector<PointCloudView> views;
+    for (std::size_t k = 0; k < count; ++k) try {
+        clouds.push_back(scaled.read(k * scaled.size() / count, run_.options));
+        views.push_back(clouds.back().view);
+      } catch (const IoError&) {  // the map names it
+      }
+    o_.method.choose_voxel_size(views, o_.input.path);
+    run_.options = o_.method.registration();
+  }
+
   reconstruction::MapInput input() const {
     reconstruction::MapInput known;
     if (!o_.odometry.empty()) known = read_odometry(o_.odometry, run_.scene.scans, o_.input.path);
@@ -207,6 +268,7 @@ class Reconstruct {
       progress_.end();
       if (!run_.aligned_here) return;
       clear_output();
+      if (o_.scale.given()) return;  // pairs of scaled scans are of no use elsewhere
       // The work of hours is safe from here on, whatever becomes of the map.
       write_pairs(
           o_.file("pairs.json"), pairs_head(run_, made, context_), made.pairs,
@@ -251,7 +313,7 @@ class Reconstruct {
   int say_interrupted() {
     progress_.end();
     std::cerr << "gpureg: interrupted";
-    if (pairs_)
+    if (pairs_ && !o_.scale.given())
       std::cerr << ", " << pairs_->first << " of " << pairs_->second
                 << " pairs are in the journal; go on with the same command and --resume";
     else
@@ -260,7 +322,7 @@ class Reconstruct {
     return kInterrupted;
   }
 
-  const ReconstructOptions& o_;
+  ReconstructOptions& o_;
   Context context_;
   FolderSet set_;
   MapRun run_;
@@ -310,6 +372,7 @@ void add_reconstruct(CommandLine& line) {
       .show_default()
       .not_negative()
       .needs(odometry);
+  o->scale.add_to(verb);
   o->method.add_to(verb);
   o->method.add_calibration_to(verb);
   verb.flag("--no-audit", o->no_audit,
@@ -325,6 +388,7 @@ void add_reconstruct(CommandLine& line) {
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] {
     o->method.registration();  // reports bad options before the clouds are read
+    check_scale(*o);
     if (!o->results.empty() && !o->method.calibration.empty())
       throw InvalidArgument(
           "--calibration scales confidences that are made here, --results has "
@@ -337,7 +401,7 @@ void add_reconstruct(CommandLine& line) {
     check_pairs(o->input, o->pairs);  // a bad file shall show before the clouds are read
     if (!o->odometry.empty())
       read_odometry(o->odometry, FragmentFolder(o->input, true).scans, o->input.path);
-    choose_voxel_size(*o);
+    if (!o->scale.given()) choose_voxel_size(*o);
     if (!o->quiet) o->method.note_calibration();
     return Reconstruct(*o).run();
   });
