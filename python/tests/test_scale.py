@@ -100,3 +100,64 @@ def test_scale_with_prior_is_refused():
         options = gpureg.RegistrationOptions(voxel_size=0.1)
         options.prepare.downsample = False
         gpureg.register(_room(1), _room(2), options=options, scale="free")
+
+
+def test_scans_of_one_unknown_scale_each_become_one_map(tmp_path):
+    factors = np.array([1, 1.6, 0.8])
+    turn = _pose()
+    clouds = [_room(1), _room(2) @ turn[:3, :3] / 1.6, (_room(3) + [1, 0, 0]) / 0.8]
+    told = []
+    options = gpureg.RegistrationOptions(voxel_size=0.1)
+    found = gpureg.reconstruct(
+        clouds,
+        scale=(0.5, 2),
+        options=options,
+        refine=False,
+        progress=lambda done, total: told.append((done, total)),
+    )
+    assert found.islands == [[0, 1, 2]]
+    assert found.scales == pytest.approx(factors, rel=0.01)
+    assert told[0][1] == 3  # pairs whose scales are searched
+    points, _ = found.points(voxel_size=0.1)
+    assert np.abs(points.max(0) - _room(1).max(0)).max() < 0.15  # one room, in the first's unit
+    assert gpureg.reconstruct(clouds[:1] * 2, options=options, refine=False).scales is None
+    with pytest.raises(TypeError, match="journal"):
+        gpureg.reconstruct(clouds, scale="free", journal=tmp_path / "pairs.journal")
+    with pytest.raises(ValueError, match="scale"):
+        gpureg.reconstruct(clouds, scale=(2, 1))
+    with pytest.raises(gpureg.InvalidArgument, match="known"):
+        gpureg.reconstruct(clouds, scale=2)
+
+
+def test_scaled_fragments_are_multiplied_when_they_are_loaded():
+    cloud = np.arange(12, dtype=np.float32).reshape(4, 3)
+    fragments = gpureg.FragmentSet.from_clouds([cloud, cloud]).scaled([2, 0.5])
+    options = gpureg.RegistrationOptions()
+    assert np.array_equal(fragments.load(0, options)[0], 2 * cloud)
+    assert np.array_equal(fragments.without([0]).load(0, options)[0], cloud / 2)
+    with pytest.raises(ValueError, match="scales: 1 for 2"):
+        gpureg.FragmentSet.from_clouds([cloud, cloud]).scaled([1])
+
+
+def test_similarities_of_another_method_are_verified():
+    truth = _pose()
+    source = (_room(2) - truth[:3, 3]) @ truth[:3, :3] / 4
+    right, wrong = truth.copy(), truth.copy()
+    right[:3, :3] *= 4
+    wrong[:3, :3] *= 5
+    options = gpureg.RegistrationOptions(voxel_size=0.1)
+    found = gpureg.verify_scaled(source, _room(1), [wrong, right], options=options)
+    assert [v.confidence > 0.5 for v in found] == [False, True]
+    assert found[1].scale == pytest.approx(4) and found[1].scale_status == "known"
+    assert found[1].target_from_source == pytest.approx(right, abs=1e-9)
+    assert found[1].information.shape == (7, 7) and found[1].verification.inlier_ratio > 0.5
+    near = right.copy()
+    near[:3, :3] *= 1.03
+    [refined] = gpureg.verify_scaled(source, _room(1), near, refine=True, options=options)
+    assert refined.scale_status == "found" and refined.scale == pytest.approx(4, rel=0.005)
+    assert "found" in repr(refined)
+    near[0, 0] += 1
+    with pytest.raises(ValueError, match=r"similarities\[0\]"):
+        gpureg.verify_scaled(source, _room(1), near, options=options)
+    with pytest.raises(ValueError, match="shape"):
+        gpureg.verify_scaled(source, _room(1), np.eye(3), options=options)
