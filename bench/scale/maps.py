@@ -82,7 +82,9 @@ def figures(found, clouds, poses, scales):
         return out
     island = found.islands[0]
     points = {k: clouds[k][:: max(1, len(clouds[k]) // 300)] for k in island}
-    at = {k: scales[k] * points[k] @ found.poses[k, :3, :3].T + found.poses[k, :3, 3] for k in island}
+    at = {
+        k: scales[k] * points[k] @ found.poses[k, :3, :3].T + found.poses[k, :3, 3] for k in island
+    }
     true = {k: points[k] @ poses[k][:3, :3].T + poses[k][:3, 3] for k in island}
     a, b = (np.concatenate([of[k] for k in island]) for of in (at, true))
     scale, turn, shift = umeyama(a, b)
@@ -100,9 +102,7 @@ def figures(found, clouds, poses, scales):
         pose[:3] /= scales[t]
         centre = np.append(clouds[s].mean(0), 1)
         metres = np.linalg.norm(((pose - truth) @ centre)[:3]) * size[t]
-        turned = angle(
-            (truth[:3, :3] * size[t] / size[s]).T @ pose[:3, :3] * scales[t] / scales[s]
-        )
+        turned = angle((truth[:3, :3] * size[t] / size[s]).T @ pose[:3, :3] * scales[t] / scales[s])
         wrong += bool(metres > FAR_METRES or turned > FAR_DEGREES)
     return out | {
         "placed": len(island),
@@ -176,9 +176,9 @@ def main():
                 row |= {"commit": commit(), "processor": processor()}
                 print(json.dumps(row), flush=True)
                 key = ("set", "every", "condition", "seed")
-                record["rows"] = [
-                    r for r in record["rows"] if any(r[k] != row[k] for k in key)
-                ] + [row]
+                record["rows"] = [r for r in record["rows"] if any(r[k] != row[k] for k in key)] + [
+                    row
+                ]
                 if arguments.json:
                     save(arguments.json, record)
 

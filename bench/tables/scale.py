@@ -116,4 +116,50 @@ def photogrammetry():
     ]
 
 
-TABLES = {"scale": scale, "photogrammetry": photogrammetry}
+MAPS = {
+    "chunks": "a laser scan and three photogrammetric clouds of a generated room",
+    "kitchen": "red kitchen",
+    "house_a": "house A",
+}
+FACTORS = {"free": "0.05 to 20, `free`", "drift": "0.8 to 1.25, range given"}
+
+
+def scaled_maps():
+    record = load("scaled_maps.json")
+    rows = [
+        "| scans | factors | maps | placed: scales known, unknown | wrong edges | error, cm: scales known, unknown | error of the scales, %: RMS, largest | pairs searched | s |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    groups = {}
+    for row in record["rows"]:
+        groups.setdefault((row["set"], row["every"], row["condition"]), []).append(row)
+    order = list(MAPS)
+    for (name, every, condition), own in sorted(
+        groups.items(), key=lambda g: (order.index(g[0][0]), g[0])
+    ):
+        shown = MAPS[name] + (f", every {every}nd scan" if every == 2 else "")
+        known = [row["known"] for row in own]
+
+        def total(entries, key):
+            return sum(entry[key] for entry in entries)
+
+        def error(entries):
+            return f"{100 * statistics.median([entry['error'] for entry in entries]):.1f}"
+
+        rms = statistics.median([row["scales"][0] for row in own])
+        rows.append(
+            f"| {shown} | {FACTORS[condition]} | {len(own)} "
+            f"| {total(known, 'placed')}, {total(own, 'placed')} of {total(own, 'scans')} "
+            f"| {total(known, 'wrong')}, {total(own, 'wrong')} | {error(known)}, {error(own)} "
+            f"| {rms:.1f}, {max(row['scales'][1] for row in own):.1f} "
+            f"| {total(own, 'searched')} of {total(own, 'pairs')} | {statistics.median([row['seconds'] for row in own]):.0f} |"
+        )
+    commits = sorted({row["commit"].rstrip("+") for row in record["rows"]})
+    return [
+        *rows,
+        "",
+        f"Made by `bench/scale/maps.py` at commit {', '.join(commits)} on {record['rows'][0]['processor']}. Placed: in the largest island.",
+    ]
+
+
+TABLES = {"scale": scale, "photogrammetry": photogrammetry, "scaled_maps": scaled_maps}

@@ -79,8 +79,9 @@ void bind_scale(py::module_& m) {
                     "PoseVerification of the source multiplied by scale: its pose is rigid.")
       .def("__repr__", [](const V& v) {
         char text[128];
-        std::snprintf(text, sizeof(text), "<gpureg.ScaledVerification, scale %g (%s), confidence %.3f>",
-                      v.scale, to_string(v.scale_status), v.verification.confidence);
+        std::snprintf(text, sizeof(text),
+                      "<gpureg.ScaledVerification, scale %g (%s), confidence %.3f>", v.scale,
+                      to_string(v.scale_status), v.verification.confidence);
         return std::string(text);
       });
   m.def(
@@ -98,8 +99,9 @@ void bind_scale(py::module_& m) {
         VerificationOptions verification;
         verification.refine = refine;
         verification.search_alternatives = search_alternatives;
-        return interruptible(
-            [&] { return verify_scaled_poses(context, a.view, b.view, given, options, verification); });
+        return interruptible([&] {
+          return verify_scaled_poses(context, a.view, b.view, given, options, verification);
+        });
       },
       py::arg("context"), py::arg("source"), py::arg("target"), py::arg("similarities"),
       py::arg("options"), py::arg("refine"), py::arg("search_alternatives"));

@@ -119,11 +119,11 @@ def verify_scaled(
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     context = context_of(context)
     matrices = _matrices(similarities, "similarities")
-    clouds = [
-        core_cloud(cloud, None, None, None, options, name)
-        for cloud, name in ((source, "source"), (target, "target"))
-    ]
-    return _core.verify_scaled(context, *clouds, matrices, options, refine, search_alternatives)
+    first = core_cloud(source, None, None, None, options, "source")
+    second = core_cloud(target, None, None, None, options, "target")
+    return _core.verify_scaled(
+        context, first, second, matrices, options, refine, search_alternatives
+    )
 
 
 def _matrices(poses: Any, name: str) -> npt.NDArray[np.float64]:

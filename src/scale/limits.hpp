@@ -12,6 +12,10 @@ constexpr double kMostChange = 0.3;
 constexpr int kRounds = 3;
 /// Scales whose difference is no ambiguity.
 constexpr double kSameScale = 0.03;
+/// Standard deviation of the scale of a pair beyond that of its points, whose errors are not
+/// independent: depth cameras have 1.5 % between two scans of one room (docs/scale.md), of which
+/// each scan has its share.
+constexpr double kOwnScale = 0.01;
 /// RefinedScale::stiffness below which the scale is not observable.
 constexpr double kLeastStiffness = 0.1;
 /// Correspondences of the refinement of the scale, in correspondence distances: it starts a few per

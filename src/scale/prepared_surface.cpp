@@ -23,8 +23,7 @@ PreparedSurface::PreparedSurface(const PreparedCloud& cloud, float distance)
 RefinedScale refine_scale(const PreparedSurface& source, const PreparedSurface& target,
                           const UnalignedIsometry3d& target_from_source, float kernel) {
   const PreparedState &s = *Access::state(source.cloud()), &t = *Access::state(target.cloud());
-  const Pose<double> local =
-      local_from_rows(rows_from_frames(target_from_source, s, t), s, t);
+  const Pose<double> local = local_from_rows(rows_from_frames(target_from_source, s, t), s, t);
   UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
   pose.linear() = Eigen::Quaterniond(local.w, local.x, local.y, local.z).toRotationMatrix();
   pose.translation() = Eigen::Vector3d(local.tx, local.ty, local.tz);

@@ -56,8 +56,8 @@ std::vector<Trial> tried(const Context& context, const PreparedLadder& source,
     trial.scale = scales[k];
     trial.result = std::move(results[k]);
     if (!trial.result.has_pose()) return;
-    const PreparedSurface surface(
-        prepared[k], kReachOfSource * options.prepare.max_correspondence_distance);
+    const PreparedSurface surface(prepared[k],
+                                  kReachOfSource * options.prepare.max_correspondence_distance);
     trial.refined = refine_scale(surface, target.surface, trial.result.target_from_source,
                                  options.refine.kernel_width);
   });

@@ -54,9 +54,8 @@ void verify_at(const Context& context, const PointCloudView& source,
     copies.push_back(std::make_unique<scale::ScaledCloud>(source, s));
     views.push_back(copies.back()->view());
   }
-  std::vector<PreparedCloud> clouds =
-      naming_cloud({"source", "target"}, 2, 0,
-                   [&] { return prepare_batch(context, views, options.prepare); });
+  std::vector<PreparedCloud> clouds = naming_cloud(
+      {"source", "target"}, 2, 0, [&] { return prepare_batch(context, views, options.prepare); });
   std::vector<Pair> pairs;
   std::vector<std::vector<UnalignedIsometry3d>> poses(scales.size());
   std::vector<std::pair<std::size_t, std::size_t>> places;
@@ -78,13 +77,11 @@ void verify_at(const Context& context, const PointCloudView& source,
     const scale::PreparedSurface surface(
         clouds[places[k].first],
         scale::kReachOfSource * options.prepare.max_correspondence_distance);
-    const scale::RefinedScale refined =
-        scale::refine_scale(surface, target, out.verification.target_from_source,
-                            options.refine.kernel_width);
+    const scale::RefinedScale refined = scale::refine_scale(
+        surface, target, out.verification.target_from_source, options.refine.kernel_width);
     out.information = refined.information;
-    out.scale_deviation = refined.scale_information > 0
-                              ? refined.rms / std::sqrt(refined.scale_information)
-                              : 0;
+    out.scale_deviation =
+        refined.scale_information > 0 ? refined.rms / std::sqrt(refined.scale_information) : 0;
     if (refined.points == 0)
       out.scale_status = ScaleStatus::none;
     else if (refined.stiffness < scale::kLeastStiffness)
@@ -145,8 +142,7 @@ std::vector<ScaledVerification> verify_scaled_poses(
           "true where clouds have scales");
   std::vector<Proposal> proposals;
   for (std::size_t k = 0; k < similarities.size(); ++k)
-    proposals.push_back(
-        proposal_of(similarities[k], "similarities[" + std::to_string(k) + "]"));
+    proposals.push_back(proposal_of(similarities[k], "similarities[" + std::to_string(k) + "]"));
   const std::vector<std::string> names{"source", "target"};
   const scale::PreparedSurface fixed(
       naming_cloud(names, 2, 1, [&] { return prepare(context, target, options.prepare); }),

@@ -89,8 +89,8 @@ TEST(Scale, IsOfEachScanOfAMap) {
     for (int row = 0; row < 4; ++row)
       for (int column = 0; column < 4; ++column) poses >> pose(row, column);
     EXPECT_EQ(number, static_cast<int>(k));
-    EXPECT_NEAR(std::cbrt(pose.topLeftCorner<3, 3>().determinant()),
-                scan["scale"].get<double>(), 1e-9);
+    EXPECT_NEAR(std::cbrt(pose.topLeftCorner<3, 3>().determinant()), scan["scale"].get<double>(),
+                1e-9);
   }
   for (const nlohmann::json& edge : map["edges"]) {
     const auto scale = [&](const char* end) {

@@ -88,8 +88,7 @@ struct Circle {
     edge.log_scale = std::log(s.scale / t.scale);
     const Eigen::Vector3d there =
         t.rigid.linear().transpose() * (s * edge.centre - t.rigid.translation()) / t.scale;
-    edge.target_from_source.translation() =
-        there - edge.target_from_source.linear() * edge.centre;
+    edge.target_from_source.translation() = there - edge.target_from_source.linear() * edge.centre;
     edge.information.setIdentity();
     edge.information.topLeftCorner<3, 3>() *= 1e4;
     edge.information.bottomRightCorner<3, 3>() *= 1e3;
@@ -138,8 +137,8 @@ TEST(SimilarityGraph, IsAMinimumOfNoisyEdges) {
           t.rigid.linear().transpose() * (s * edge.centre - t.rigid.translation()) / t.scale;
       const Eigen::Matrix3d back = edge.target_from_source.linear().transpose();
       Eigen::Matrix<double, 6, 1> e;
-      e.head<3>() = pose_graph::log_rotation(back * t.rigid.linear().transpose() *
-                                             s.rigid.linear());
+      e.head<3>() =
+          pose_graph::log_rotation(back * t.rigid.linear().transpose() * s.rigid.linear());
       e.tail<3>() = back * (arm - edge.target_from_source * edge.centre) +
                     edge.centre.cross(Eigen::Vector3d(e.head<3>()));
       const double grown = std::log(s.scale / t.scale) - edge.log_scale;
@@ -210,8 +209,8 @@ TEST(ScaledMap, OfScansInUnitsOfTheirOwn) {
     told = done;
     total = all;
   };
-  const auto found = reconstruction::find_scales(context, fragments, range,
-                                                 RegistrationOptions{0.1f}, callbacks);
+  const auto found =
+      reconstruction::find_scales(context, fragments, range, RegistrationOptions{0.1f}, callbacks);
   EXPECT_EQ(told, 6u);
   EXPECT_EQ(total, 6u);
   ASSERT_EQ(found.size(), rooms.factors.size());
@@ -231,8 +230,7 @@ TEST(ScaledMap, OfScansInUnitsOfTheirOwn) {
   EXPECT_EQ(map.scales[0], scales[0]);
   for (std::size_t k = 0; k < 4; ++k) {
     EXPECT_NEAR(map.scales[k] / rooms.factors[k], 1, 0.005);
-    const Eigen::Isometry3d truth =
-        rooms.world_from_scan[0].inverse() * rooms.world_from_scan[k];
+    const Eigen::Isometry3d truth = rooms.world_from_scan[0].inverse() * rooms.world_from_scan[k];
     for (std::size_t n = 0; n < rooms.clouds[k].size(); n += 97) {
       const Eigen::Vector3d p = rooms.clouds[k][n].cast<double>();
       EXPECT_LT((map.made.map.scans[k].island_from_scan * (map.scales[k] * p) -
@@ -280,11 +278,10 @@ TEST(ScaledMap, SaysWhatIsWrong) {
 }
 
 TEST(ScaledMap, UnreadableFragmentsArePartsOfTheirOwn) {
-  const FragmentsOf fragments({"a", "b", "c"},
-                              [](std::size_t k) -> PointCloud {
-                                if (k == 1) throw IoError("b is gone");
-                                return {};
-                              });
+  const FragmentsOf fragments({"a", "b", "c"}, [](std::size_t k) -> PointCloud {
+    if (k == 1) throw IoError("b is gone");
+    return {};
+  });
   const auto found = reconstruction::find_scales(Context::cpu(1), fragments);
   for (std::uint32_t k = 0; k < 3; ++k) {
     EXPECT_EQ(found[k].part, k);
@@ -296,9 +293,8 @@ TEST(ScaledMap, CanBeCancelled) {
   const ScaledRooms rooms;
   reconstruction::ScaleCallbacks callbacks;
   callbacks.should_stop = [] { return true; };
-  EXPECT_THROW(
-      reconstruction::find_scales(Context::cpu(2), rooms.fragments(), {}, {}, callbacks),
-      reconstruction::Cancelled);
+  EXPECT_THROW(reconstruction::find_scales(Context::cpu(2), rooms.fragments(), {}, {}, callbacks),
+               reconstruction::Cancelled);
 }
 
 }  // namespace

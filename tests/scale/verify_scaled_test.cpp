@@ -69,8 +69,9 @@ TEST_F(ScaledPoses, HasTheVerdictOfTheScaledClouds) {
   UnalignedIsometry3d off;
   off = pose;
   off.translation() += Eigen::Vector3d(0.02, 0, 0.01);
-  const auto plain = verify_poses(context, prepare(context, PointCloudView(scaled), options),
-                                  prepare(context, PointCloudView(target), options), {off}, options);
+  const auto plain =
+      verify_poses(context, prepare(context, PointCloudView(scaled), options),
+                   prepare(context, PointCloudView(target), options), {off}, options);
   UnalignedMatrix4d given = off.matrix();
   given.topLeftCorner<3, 3>() *= 2;
   const auto found = verified({given});

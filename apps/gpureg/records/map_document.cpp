@@ -89,19 +89,19 @@ Json map_document(const MapRun& run, const Context& context) {
                        {"jumps", run.made.map.agreement.jumps}};
   json["edges"] = Json::array();
   for (const reconstruction::Edge& edge : run.made.map.edges)
-    json["edges"].push_back({{"i", run.scene.numbers[edge.target]},
-                             {"j", run.scene.numbers[edge.source]},
-                             {"name_i", run.scene.scans[edge.target].name},
-                             {"name_j", run.scene.scans[edge.source].name},
-                             {"T_ij", to_json(run.of_files(edge.source, edge.target,
-                                                           edge.target_from_source))},
-                             {"confidence", edge.confidence},
-                             {"pair_confidence", edge.pair_confidence},
-                             {"map_confidence", edge.map_confidence},
-                             {"weight", edge.weight},
-                             {"state", edge.accepted ? "accepted" : "rejected"},
-                             {"reason", reconstruction::to_string(edge.reason)},
-                             {"mode", edge.mode}});
+    json["edges"].push_back(
+        {{"i", run.scene.numbers[edge.target]},
+         {"j", run.scene.numbers[edge.source]},
+         {"name_i", run.scene.scans[edge.target].name},
+         {"name_j", run.scene.scans[edge.source].name},
+         {"T_ij", to_json(run.of_files(edge.source, edge.target, edge.target_from_source))},
+         {"confidence", edge.confidence},
+         {"pair_confidence", edge.pair_confidence},
+         {"map_confidence", edge.map_confidence},
+         {"weight", edge.weight},
+         {"state", edge.accepted ? "accepted" : "rejected"},
+         {"reason", reconstruction::to_string(edge.reason)},
+         {"mode", edge.mode}});
   return json;
 }
 

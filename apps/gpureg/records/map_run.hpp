@@ -17,8 +17,8 @@ struct MapRun {
   RegistrationOptions options;
   FragmentFolder scene;  ///< the scans of the map
   reconstruction::MapOfSet made;
-  /// Of each scan of the map: the map's unit per unit of the scan; empty: all 1. Poses of `made` are
-  /// those of the scaled scans.
+  /// Of each scan of the map: the map's unit per unit of the scan; empty: all 1. Poses of `made`
+  /// are those of the scaled scans.
   std::vector<double> scales;
   bool aligned_here = false;  ///< the pairs were aligned by this run
   std::size_t map_points = 0;

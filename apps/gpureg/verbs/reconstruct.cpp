@@ -160,7 +160,8 @@ class Reconstruct {
     }
     progress_.end();
     if (!write_outputs()) return say_interrupted();
-    if (run_.made.journal && !o_.scale.given()) ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
+    if (run_.made.journal && !o_.scale.given())
+      ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
     if (!o_.quiet) {
       std::cout << "voxel size " << o_.method.voxel_size_text() << "\n";
       std::cout << map_summary(run_, context_);
@@ -185,15 +186,15 @@ class Reconstruct {
     std::vector<double> scales;
     for (const reconstruction::ScanScale& scan : found) scales.push_back(scan.scale);
     choose_voxel_size_of(scales);
-    const auto guesses = std::count_if(found.begin(), found.end(),
-                                       [](const auto& scan) { return scan.part > 0; });
+    const auto guesses =
+        std::count_if(found.begin(), found.end(), [](const auto& scan) { return scan.part > 0; });
     if (guesses > 0 && !o_.quiet)
-      std::cerr << "gpureg: note: no pair tells the scale of " << guesses << " of "
-                << found.size() << " scans to the first one" << std::endl;
+      std::cerr << "gpureg: note: no pair tells the scale of " << guesses << " of " << found.size()
+                << " scans to the first one" << std::endl;
     reconstruction::MapOptions map_options = options();
     map_options.journal.clear();
-    reconstruction::ScaledMapOfSet map = reconstruction::reconstruct(
-        context_, set_, scales, known, map_options, callbacks());
+    reconstruction::ScaledMapOfSet map =
+        reconstruction::reconstruct(context_, set_, scales, known, map_options, callbacks());
     run_.made = std::move(map.made);
     for (const std::size_t k : run_.made.scans) run_.scales.push_back(map.scales[k]);
   }

@@ -36,7 +36,8 @@ struct ScaleCallbacks {
 /// @param range of every pair: scales of the later scan to the earlier one.
 /// @param options as for align_scaled_auto().
 /// @return one entry per fragment; one that cannot be read is a part of its own.
-/// @throws InvalidArgument for a range that is none or known, and as align_scaled_auto(); Cancelled.
+/// @throws InvalidArgument for a range that is none or known, and as align_scaled_auto();
+/// Cancelled.
 std::vector<ScanScale> find_scales(const Context& context, const FragmentSet& fragments,
                                    const ScaleRange& range = {},
                                    const RegistrationOptions& options = {},

@@ -139,7 +139,8 @@ struct ScaledVerification {
 };
 
 /// verify_poses() for similarities that another method proposes: TEASER++, the loop of a monocular
-/// run. Those of other scales compete with each other; scales that nobody proposes are not searched.
+/// run. Those of other scales compete with each other; scales that nobody proposes are not
+/// searched.
 /// @param similarities p_target = M * (p_source, 1), any number of them.
 /// @param options as for align_scaled().
 /// @param verification refine: the scale, too, with the pose.

@@ -134,8 +134,9 @@ py::dict report_of(const RefineReport& report) {
 }
 
 /// [(scale, part)] of each fragment. progress: called with (done, total).
-std::vector<std::pair<double, std::uint32_t>> scales_of(const Context& context, const PythonSet& set,
-                                                        double least, double most,
+std::vector<std::pair<double, std::uint32_t>> scales_of(const Context& context,
+                                                        const PythonSet& set, double least,
+                                                        double most,
                                                         const RegistrationOptions options,
                                                         const py::object& progress) {
   Teller tell(progress);
@@ -150,8 +151,8 @@ std::vector<std::pair<double, std::uint32_t>> scales_of(const Context& context, 
   return out;
 }
 
-/// results: of the pairs; None: they are aligned. scales: of each fragment; None: 1. progress: called
-/// with (step, done, total).
+/// results: of the pairs; None: they are aligned. scales: of each fragment; None: 1. progress:
+/// called with (step, done, total).
 py::dict reconstruct_set(const Context& context, const PythonSet& set,
                          const std::optional<IndexArray>& pairs,
                          const std::optional<std::vector<RegistrationResult>>& results,

@@ -59,8 +59,8 @@ SearchedPair searched(const Context& context, std::size_t source, std::size_t ta
                       const ScaleRange& range, const RegistrationOptions& options) {
   const ScaledResult result = align_scaled_auto(context, moved, fixed, range, options);
   SearchedPair out{source, target, {}, result.scale_deviation};
-  const bool any = result.scale_status == ScaleStatus::found ||
-                   result.scale_status == ScaleStatus::ambiguous;
+  const bool any =
+      result.scale_status == ScaleStatus::found || result.scale_status == ScaleStatus::ambiguous;
   for (const ScaleCandidate& candidate : result.candidates)
     if (any && candidate.confidence >= Options().min_edge_confidence)
       out.candidates.push_back(candidate);

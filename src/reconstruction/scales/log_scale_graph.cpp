@@ -2,52 +2,33 @@
 #include "reconstruction/scales/log_scale_graph.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "gpureg/pose_graph.hpp"
 #include "gpureg/reconstruction.hpp"
 #include "math/exponential.hpp"
+#include "pose_graph/components.hpp"
+#include "scale/limits.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
 
-/// Standard deviation of the scale of a pair whose points say nothing else: depth cameras have 1.5 %
-/// between two scans of one room (docs/scale.md), of which each scan has its share.
-constexpr double kOwnScale = 0.01;
-constexpr double kMostConfidence = 0.999;  // as for the poses of a map
+constexpr double kNeverSurer = 0.999;  // as for the poses of a map
 
-/// Sets of scans; the smallest is the root.
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  std::uint32_t find(std::uint32_t k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-  void merge(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
-using PairOfScans = std::pair<std::uint32_t, std::uint32_t>;
+using PairOfScans = std::pair<int, int>;
 
 /// The sets that links connect, counted in the order of their first scans.
 std::vector<std::uint32_t> connected(std::size_t scans, const std::vector<PairOfScans>& links,
                                      const std::vector<char>& used) {
-  Sets sets(scans);
+  pose_graph::UnionFind sets(static_cast<int>(scans));
   for (std::size_t k = 0; k < links.size(); ++k)
     if (used[k]) sets.merge(links[k].first, links[k].second);
   std::vector<std::uint32_t> out(scans);
   std::uint32_t next = 0;
-  for (std::uint32_t k = 0; k < scans; ++k) out[k] = sets.find(k) == k ? next++ : out[sets.find(k)];
+  for (std::size_t k = 0; k < scans; ++k) {
+    const auto root = static_cast<std::size_t>(sets.find(static_cast<int>(k)));
+    out[k] = root == k ? next++ : out[root];
+  }
   return out;
 }
 
@@ -67,9 +48,9 @@ AgreedScales agreed_scales(std::size_t scans, const std::vector<SearchedPair>& p
     };
     const pose_graph::UnalignedMatrix6d information =
         pose_graph::UnalignedMatrix6d::Identity() /
-        (kOwnScale * kOwnScale + pair.deviation * pair.deviation);
+        (scale::kOwnScale * scale::kOwnScale + pair.deviation * pair.deviation);
     const auto confidence_of = [](const ScaleCandidate& candidate) {
-      return std::min(candidate.confidence, kMostConfidence);
+      return std::min(candidate.confidence, kNeverSurer);
     };
     pose_graph::Edge edge;
     edge.source = static_cast<std::int64_t>(pair.source);
@@ -81,8 +62,7 @@ AgreedScales agreed_scales(std::size_t scans, const std::vector<SearchedPair>& p
       edge.alternatives.push_back(
           {pose_of(pair.candidates[k].scale), information, confidence_of(pair.candidates[k])});
     graph.edges.push_back(std::move(edge));
-    links.emplace_back(static_cast<std::uint32_t>(pair.source),
-                       static_cast<std::uint32_t>(pair.target));
+    links.emplace_back(static_cast<int>(pair.source), static_cast<int>(pair.target));
   }
   pose_graph::Options options;
   options.threads = 1;
@@ -99,7 +79,8 @@ AgreedScales agreed_scales(std::size_t scans, const std::vector<SearchedPair>& p
     if (!used[k]) continue;
     used[k] = 0;
     const std::vector<std::uint32_t> without = connected(scans, links, used);
-    on_loops[k] = without[links[k].first] == without[links[k].second];
+    on_loops[k] = without[static_cast<std::size_t>(links[k].first)] ==
+                  without[static_cast<std::size_t>(links[k].second)];
     used[k] = 1;
   }
   out.settled = connected(scans, links, on_loops);

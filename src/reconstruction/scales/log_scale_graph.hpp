@@ -18,9 +18,9 @@ struct SearchedPair {
 
 /// The scales that a set of pairs agrees on.
 struct AgreedScales {
-  std::vector<double> log_scales;       ///< of each scan, to the first one of its part
-  std::vector<std::uint32_t> parts;     ///< that accepted pairs connect
-  std::vector<std::uint32_t> settled;   ///< within a part: scans that loops of pairs connect
+  std::vector<double> log_scales;      ///< of each scan, to the first one of its part
+  std::vector<std::uint32_t> parts;    ///< that accepted pairs connect
+  std::vector<std::uint32_t> settled;  ///< within a part: scans that loops of pairs connect
 };
 
 AgreedScales agreed_scales(std::size_t scans, const std::vector<SearchedPair>& pairs);

@@ -17,10 +17,7 @@ namespace gpureg::reconstruction {
 namespace {
 
 /// Maps at most, before the last one.
-constexpr int kRounds = 2;
-/// Standard deviation of the scale of an edge whose points determine it: errors of neighbouring
-/// points are not independent (docs/scale.md).
-constexpr double kScaleOfEdge = 0.01;
+constexpr int kMapsBefore = 2;
 /// A scale that differs by more from the one of the map is that of another pose.
 constexpr double kMostOfEdge = 0.1;
 /// The edge with a free scale, from its pose in the map's set.
@@ -33,7 +30,7 @@ SimilarityEdge edge_of(const Edge& edge, const scale::RefinedScale& refined) {
   out.information = edge.information;
   const bool known = refined.points > 0 && refined.stiffness >= scale::kLeastStiffness &&
                      std::abs(refined.factor - 1) <= kMostOfEdge;
-  const double deviation = known ? kScaleOfEdge : kMostOfEdge;
+  const double deviation = known ? scale::kOwnScale : kMostOfEdge;
   if (known) out.log_scale = portable::log(refined.factor);
   out.scale_information = 1 / (deviation * deviation);
   return out;
@@ -62,9 +59,9 @@ std::vector<double> refined_factors(const Context& context, const MapOfSet& made
   std::vector<SimilarityEdge> graph(edges.size());
   for_each_on(threads, edges.size(), [&](std::size_t k) {
     const Edge& edge = *edges[k];
-    graph[k] = edge_of(edge, scale::refine_scale(*surfaces[edge.source], *surfaces[edge.target],
-                                                 edge.target_from_source,
-                                                 settings.refine.kernel_width));
+    graph[k] =
+        edge_of(edge, scale::refine_scale(*surfaces[edge.source], *surfaces[edge.target],
+                                          edge.target_from_source, settings.refine.kernel_width));
   });
   std::vector<Similarity> nodes(map.scans.size());
   std::vector<char> held(map.scans.size(), 0);
@@ -83,9 +80,11 @@ ScaledMapOfSet reconstruct(const Context& context, const FragmentSet& fragments,
                            const std::vector<double>& scales, const MapInput& input,
                            const MapOptions& options, const MapCallbacks& callbacks) {
   if (input.results)
-    throw InvalidArgument("results: of pairs of other scales; expected none where scans have scales");
+    throw InvalidArgument(
+        "results: of pairs of other scales; expected none where scans have scales");
   if (!options.journal.empty())
-    throw InvalidArgument("journal is " + options.journal + ", expected none where scans have scales");
+    throw InvalidArgument("journal is " + options.journal +
+                          ", expected none where scans have scales");
   MapOptions coarse = options;
   coarse.with_refinement = coarse.with_surfaces = false;
   MapCallbacks quiet;
@@ -93,7 +92,7 @@ ScaledMapOfSet reconstruct(const Context& context, const FragmentSet& fragments,
   quiet.should_stop = callbacks.should_stop;
   ScaledMapOfSet out;
   out.scales = scales;
-  for (bool settled = false; !settled && out.rounds < kRounds; ++out.rounds) {
+  for (bool settled = false; !settled && out.rounds < kMapsBefore; ++out.rounds) {
     out.made = reconstruct(context, ScaledFragments(fragments, out.scales), input, coarse, quiet);
     const std::vector<double> factors = refined_factors(context, out.made, options.registration);
     settled = true;
@@ -102,7 +101,8 @@ ScaledMapOfSet reconstruct(const Context& context, const FragmentSet& fragments,
       out.scales[out.made.scans[k]] *= factors[k];
     }
   }
-  out.made = reconstruct(context, ScaledFragments(fragments, out.scales), input, options, callbacks);
+  out.made =
+      reconstruct(context, ScaledFragments(fragments, out.scales), input, options, callbacks);
   ++out.rounds;
   return out;
 }

@@ -55,8 +55,7 @@ struct Linearised {
 
 /// The node moved in its own frame.
 void move(const Vector7& step, Similarity& node) {
-  const Eigen::Matrix3d turned =
-      node.rigid.linear() * pose_graph::exp_rotation(step.head<3>());
+  const Eigen::Matrix3d turned = node.rigid.linear() * pose_graph::exp_rotation(step.head<3>());
   node.rigid.translation() = node * step.segment<3>(3);
   node.rigid.linear() = Eigen::Quaterniond(turned).normalized().toRotationMatrix();
   node.scale *= portable::exp(step[6]);

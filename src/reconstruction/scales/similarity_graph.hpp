@@ -23,10 +23,10 @@ struct Similarity {
 struct SimilarityEdge {
   std::size_t source = 0, target = 0;
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
-  double log_scale = 0;                                 ///< of the source to the target
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();     ///< in the source's frame
-  pose_graph::UnalignedMatrix6d information;            ///< of the pose: pose_graph::Edge
-  double scale_information = 0;                         ///< of log_scale
+  double log_scale = 0;                              ///< of the source to the target
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< in the source's frame
+  pose_graph::UnalignedMatrix6d information;         ///< of the pose: pose_graph::Edge
+  double scale_information = 0;                      ///< of log_scale
 };
 
 /// Moves the nodes to the least squares of all edges by Gauss-Newton with a sparse factorisation
