@@ -223,7 +223,7 @@ TEST(ScaledMap, OfScansInUnitsOfTheirOwn) {
   scales[1] *= 1.02;  // the map mends it
   reconstruction::MapOptions options{RegistrationOptions{0.1f}};
   const reconstruction::ScaledMapOfSet map =
-      reconstruction::reconstruct(context, fragments, scales, {}, options);
+      reconstruction::reconstruct_scaled(context, fragments, scales, {}, options);
   EXPECT_GE(map.rounds, 2);
   ASSERT_EQ(map.made.map.islands.size(), 1u);
   ASSERT_EQ(map.made.map.placed(), 4u);
@@ -274,7 +274,8 @@ TEST(ScaledMap, SaysWhatIsWrong) {
   reconstruction::MapOptions options;
   options.journal = "/tmp/pairs.journal";
   expect_error<InvalidArgument>(
-      [&] { reconstruction::reconstruct(context, fragments, {1, 1}, {}, options); }, {"journal"});
+      [&] { reconstruction::reconstruct_scaled(context, fragments, {1, 1}, {}, options); },
+      {"journal"});
 }
 
 TEST(ScaledMap, UnreadableFragmentsArePartsOfTheirOwn) {

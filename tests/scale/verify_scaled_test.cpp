@@ -17,10 +17,15 @@ class ScaledPoses : public testing::Test {
  protected:
   ScaledPoses() {
     std::mt19937 random(5);
-    target = test::scan_room(random);
+    target = thinned(test::scan_room(random));
     pose = test::random_pose(random);
-    source = test::moved(pose.inverse(), test::scan_room(random));
+    source = test::moved(pose.inverse(), thinned(test::scan_room(random)));
     for (Eigen::Vector3f& p : source) p = (p.cast<double>() / kFactor).cast<float>();
+  }
+  static std::vector<Eigen::Vector3f> thinned(const std::vector<Eigen::Vector3f>& points) {
+    std::vector<Eigen::Vector3f> out;
+    for (std::size_t k = 0; k < points.size(); k += 3) out.push_back(points[k]);
+    return out;
   }
   UnalignedMatrix4d similarity(double scale) const {
     UnalignedMatrix4d out = pose.matrix();

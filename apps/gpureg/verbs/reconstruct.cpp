@@ -150,7 +150,7 @@ class Reconstruct {
     const reconstruction::MapInput known = input();
     try {
       if (o_.scale.given())
-        reconstruct_scaled(known);
+        make_scaled(known);
       else
         o_.resume.with(o_.journal(), [&] {
           run_.made = reconstruction::reconstruct(context_, set_, known, options(), callbacks());
@@ -172,7 +172,7 @@ class Reconstruct {
 
  private:
   /// Finds the scales of the scans, then makes the map of the scaled scans.
-  void reconstruct_scaled(const reconstruction::MapInput& known) {
+  void make_scaled(const reconstruction::MapInput& known) {
     reconstruction::ScaleCallbacks callbacks_of_search;
     std::optional<Progress> progress;
     callbacks_of_search.on_progress = [&](std::size_t done, std::size_t total) {
@@ -194,7 +194,7 @@ class Reconstruct {
     reconstruction::MapOptions map_options = options();
     map_options.journal.clear();
     reconstruction::ScaledMapOfSet map =
-        reconstruction::reconstruct(context_, set_, scales, known, map_options, callbacks());
+        reconstruction::reconstruct_scaled(context_, set_, scales, known, map_options, callbacks());
     run_.made = std::move(map.made);
     for (const std::size_t k : run_.made.scans) run_.scales.push_back(map.scales[k]);
   }

@@ -76,8 +76,9 @@ struct ScaledMapOfSet {
 /// @param input world_from_scan and odometry in the unit of the scaled scans; without results.
 /// @param options without a journal.
 /// @throws InvalidArgument as above and as reconstruct().
-ScaledMapOfSet reconstruct(const Context& context, const FragmentSet& fragments,
-                           const std::vector<double>& scales, const MapInput& input = {},
-                           const MapOptions& options = {}, const MapCallbacks& callbacks = {});
+ScaledMapOfSet reconstruct_scaled(const Context& context, const FragmentSet& fragments,
+                                  const std::vector<double>& scales, const MapInput& input = {},
+                                  const MapOptions& options = {},
+                                  const MapCallbacks& callbacks = {});
 
 }  // namespace gpureg::reconstruction

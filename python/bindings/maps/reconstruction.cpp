@@ -173,7 +173,8 @@ py::dict reconstruct_set(const Context& context, const PythonSet& set,
   py::dict out;
   if (scales) {
     ScaledMapOfSet scaled;
-    tell.run([&] { scaled = reconstruct(context, set, *scales, input, options, callbacks); });
+    tell.run(
+        [&] { scaled = reconstruct_scaled(context, set, *scales, input, options, callbacks); });
     out["scales"] = scaled.scales;
     made = std::move(scaled.made);
   } else {

@@ -76,9 +76,9 @@ std::vector<double> refined_factors(const Context& context, const MapOfSet& made
 
 }  // namespace
 
-ScaledMapOfSet reconstruct(const Context& context, const FragmentSet& fragments,
-                           const std::vector<double>& scales, const MapInput& input,
-                           const MapOptions& options, const MapCallbacks& callbacks) {
+ScaledMapOfSet reconstruct_scaled(const Context& context, const FragmentSet& fragments,
+                                  const std::vector<double>& scales, const MapInput& input,
+                                  const MapOptions& options, const MapCallbacks& callbacks) {
   if (input.results)
     throw InvalidArgument(
         "results: of pairs of other scales; expected none where scans have scales");
