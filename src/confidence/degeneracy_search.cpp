@@ -43,14 +43,15 @@ Span<const double> fractions_for(double log_odds, bool model) {
   return {kFractions, count};
 }
 
-/// Whether a pose has returned to the mode, by the source points in correspondences under it.
-ReturnTest return_test(const ModeOutcome& mode, const PreparedState& source,
+/// Whether a pose has returned to the mode, by the source points in correspondences under it. On a
+/// model none has: the one that fits best may be half a voxel away (fits_model_better()).
+ReturnTest return_test(const ModeOutcome& mode, const PreparedState& source, bool model,
                        const RegistrationSettings& options) {
   ReturnTest test{};
   test.origin = mode.pose;
   test.squared_distance = -1.0;
   const Moments& m = mode.source_moments;
-  if (m.count == 0) return test;
+  if (model || m.count == 0) return test;
   const double radius = static_cast<double>(source.radius),
                unit =
                    radius / (static_cast<double>(kMomentFixedScale) * static_cast<double>(m.count)),
@@ -84,7 +85,7 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
   const ModeOutcome& mode = *modes[best];
   const InformationSpectrum& spectrum = spectra[best];
   out.origin_mode = mode.origin_mode;
-  out.returned = return_test(mode, *pair.source, options);
+  out.returned = return_test(mode, *pair.source, ranking.available.model, options);
   for (const double fraction : fractions_for(ranking.log_odds[best], ranking.available.model))
     for (const double step : {fraction * distance, -fraction * distance})
       out.poses.push_back(moved_along(spectrum, mode.pose, step));
