@@ -34,6 +34,9 @@ struct AlignedPair {
   const PreparedState& moved() const { return swapped ? target : source; }
   const PreparedState& fixed() const { return swapped ? source : target; }
   bool flat() const { return planar_pair(source, target); }
+  bool with_model() const {
+    return confidence::with_model(source.statistics.viewpoint, target.statistics.viewpoint);
+  }
 
   /// For the engine: with the prior, and with the planes of two 2-D scans.
   PairInput input(const RegistrationPrior& prior = {}) const {

@@ -95,7 +95,7 @@ class Conclusion {
     result_.target_moments = pair_.target_moments(outcome_);
   }
 
-  /// The modes in the caller's order of the clouds, without those that equal their origin.
+  /// The modes in the caller's order of the clouds.
   void collect_modes() {
     const std::vector<PoseEvidence> evidence = pair_.evidence_of(outcome_);
     for (std::size_t k = 0; k < outcome_.modes.size(); ++k) {
@@ -103,21 +103,24 @@ class Conclusion {
       RegistrationMode out;
       out.target_from_source = pair_.transform_of(mode.pose);
       // A perturbed pose within the correspondence distance of its origin is that mode, less well
-      // refined; evidence cannot separate poses that close.
+      // refined; evidence cannot separate poses that close. On a model it stands for the mode where
+      // it fits better.
       const auto [origin, is_first] = origins_.emplace(mode.origin_mode, k);
-      if (!is_first && distance_between(out.target_from_source,
+      const bool at_origin =
+          !is_first && distance_between(out.target_from_source,
                                         pair_.transform_of(outcome_.modes[origin->second].pose),
                                         origin_moments(mode.origin_mode)) <=
-                           static_cast<double>(options_.prepare.max_correspondence_distance))
-        continue;
+                           static_cast<double>(options_.prepare.max_correspondence_distance);
+      if (at_origin && !pair_.with_model()) continue;
       out.evidence = evidence[k];
       out.rank_before_refinement = static_cast<std::uint32_t>(k);
       modes_.push_back(out);
+      at_origin_.push_back(at_origin);
     }
     middle_ = middle_of(pair_.source_moments(outcome_.modes.front()), origin_of(pair_.source));
   }
 
-  /// Ranks the modes by their evidence, drops each that equals a better one, and fills in the
+  /// Ranks the modes by their evidence, keeps one of those that equal each other, and fills in the
   /// confidences.
   void rank_modes() {
     std::vector<PoseEvidence> evidence;
@@ -125,13 +128,11 @@ class Conclusion {
     const confidence::Ranking ranking = pair_.ranking_of(evidence);
     std::vector<RegistrationMode>& out = result_.modes;
     std::vector<confidence::RankedMode> distinct;
-    for (const std::size_t k : ranking.order) {
-      const RegistrationMode& mode = modes_[k];
-      if (std::any_of(out.begin(), out.end(),
-                      [&](const RegistrationMode& better) { return same(better, mode); }))
-        continue;
-      out.push_back(mode);
-      distinct.push_back({mode.evidence, ranking.log_odds[k], pair_.overlap_of(outcome_of(mode))});
+    for (const Group& group : groups_of(ranking)) {
+      out.push_back(modes_[group.kept]);
+      const RegistrationMode& likeliest = modes_[group.likeliest];
+      distinct.push_back({likeliest.evidence, ranking.log_odds[group.likeliest],
+                          pair_.overlap_of(outcome_of(likeliest))});
     }
     auto confidences =
         confidence::confidences_of(distinct, ranking.available, options_.evidence.modes);
@@ -141,6 +142,34 @@ class Conclusion {
     for (const RegistrationMode& mode : out) equivalent.push_back(mode.equivalent);
     confidence::calibrate_modes(options_.calibration, equivalent, confidences);
     set_confidences(confidences);
+  }
+
+  /// Poses that equal each other, by their indices in modes_.
+  struct Group {
+    std::size_t likeliest;  ///< has the confidence of all, which was fitted to the likeliest poses
+    std::size_t kept;       ///< stands for all
+  };
+
+  /// In descending order of their log odds. The likeliest pose of a group is kept, or on a model
+  /// the one of similar odds that fits best.
+  std::vector<Group> groups_of(const confidence::Ranking& ranking) const {
+    std::vector<Group> groups;
+    const auto group_of = [&](std::size_t k) {
+      return std::find_if(groups.begin(), groups.end(), [&](const Group& group) {
+        return same(modes_[group.likeliest], modes_[k]);
+      });
+    };
+    for (const std::size_t k : ranking.order)
+      if (!at_origin_[k] && group_of(k) == groups.end()) groups.push_back({k, k});
+    if (!ranking.available.model) return groups;
+    for (const std::size_t k : ranking.order) {
+      const auto group = group_of(k);
+      if (group != groups.end() &&
+          ranking.log_odds[k] >= ranking.log_odds[group->likeliest] - kSimilarLogOdds &&
+          confidence::fits_model_better(modes_[k].evidence, modes_[group->kept].evidence))
+        group->kept = k;
+    }
+    return groups;
   }
 
   void set_confidences(const std::vector<confidence::ModeConfidence>& from) {
@@ -243,7 +272,8 @@ class Conclusion {
   RegistrationResult result_;
   std::map<std::uint32_t, std::size_t> origins_;  ///< first mode of each origin mode
   std::vector<RegistrationMode> modes_;           ///< that may be ranked
-  Eigen::Vector3d middle_;  ///< centre of the source points in correspondences
+  std::vector<bool> at_origin_;  ///< of these: a perturbed pose close to its origin
+  Eigen::Vector3d middle_;       ///< centre of the source points in correspondences
 };
 
 }  // namespace

@@ -70,6 +70,13 @@ Ranking ranking_of(const std::vector<PoseEvidence>& modes, const PreparedState& 
   return out;
 }
 
+bool fits_model_better(const PoseEvidence& a, const PoseEvidence& b) {
+  const auto overlap = [](const PoseEvidence& e) {
+    return std::max(e.source_normal_weighted_overlap, e.target_normal_weighted_overlap);
+  };
+  return overlap(a) > overlap(b);
+}
+
 std::vector<ModeConfidence> confidences_of(const std::vector<RankedMode>& modes,
                                            AvailableEvidence available, std::uint32_t refined) {
   std::vector<ModeConfidence> out;

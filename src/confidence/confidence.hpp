@@ -28,6 +28,11 @@ struct Ranking {
 Ranking ranking_of(const std::vector<PoseEvidence>& modes, const PreparedState& source,
                    const PreparedState& target);
 
+/// Which of two poses of a scan on its model that lie close together fits better: the one with more
+/// normal-weighted overlap. The ranking counts points near the model whatever their normals, which
+/// are as many when the ground lies a voxel too low, on the wrong side of its surface.
+bool fits_model_better(const PoseEvidence& a, const PoseEvidence& b);
+
 /// Number of overlapping points of the side with fewer of them, and the points of that side.
 struct OverlapCount {
   std::uint32_t points, of;

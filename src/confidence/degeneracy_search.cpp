@@ -32,24 +32,26 @@ constexpr double kHopelessLogOdds = -5, kConfidentLogOdds = 3;
 
 /// Distances as fractions of evidence.degeneracy_search_distance. Near the truth refinement stops
 /// at places 10 to 20 cm apart at the default voxel size, hence steps of a quarter. A confident
-/// mode is only tested for another stable pose at the full distance.
-Span<const double> fractions_for(double log_odds) {
+/// mode is only tested for another stable pose at the full distance, unless it is on a model: there
+/// the log odds do not tell a pose from one a voxel away (fits_model_better()).
+Span<const double> fractions_for(double log_odds, bool model) {
   static constexpr double kFractions[] = {1, 0.75, 0.5, 0.25};
   static_assert(2 * std::size(kFractions) == limits::kMaxPerturbedPoses, "both ways");
-  const std::size_t count = log_odds < kHopelessLogOdds    ? 0
-                            : log_odds < kConfidentLogOdds ? std::size(kFractions)
-                                                           : 1;
+  const std::size_t count = log_odds < kHopelessLogOdds             ? 0
+                            : model || log_odds < kConfidentLogOdds ? std::size(kFractions)
+                                                                    : 1;
   return {kFractions, count};
 }
 
-/// Whether a pose has returned to the mode, by the source points in correspondences under it.
-ReturnTest return_test(const ModeOutcome& mode, const PreparedState& source,
+/// Whether a pose has returned to the mode, by the source points in correspondences under it. On a
+/// model none has: the one that fits best may be half a voxel away (fits_model_better()).
+ReturnTest return_test(const ModeOutcome& mode, const PreparedState& source, bool model,
                        const RegistrationSettings& options) {
   ReturnTest test{};
   test.origin = mode.pose;
   test.squared_distance = -1.0;
   const Moments& m = mode.source_moments;
-  if (m.count == 0) return test;
+  if (model || m.count == 0) return test;
   const double radius = static_cast<double>(source.radius),
                unit =
                    radius / (static_cast<double>(kMomentFixedScale) * static_cast<double>(m.count)),
@@ -83,8 +85,8 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
   const ModeOutcome& mode = *modes[best];
   const InformationSpectrum& spectrum = spectra[best];
   out.origin_mode = mode.origin_mode;
-  out.returned = return_test(mode, *pair.source, options);
-  for (const double fraction : fractions_for(ranking.log_odds[best]))
+  out.returned = return_test(mode, *pair.source, ranking.available.model, options);
+  for (const double fraction : fractions_for(ranking.log_odds[best], ranking.available.model))
     for (const double step : {fraction * distance, -fraction * distance})
       out.poses.push_back(moved_along(spectrum, mode.pose, step));
   return out;

@@ -192,7 +192,7 @@ AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes, Vie
     available.free_space |= e.source_observed > 0 || e.target_observed > 0;
     available.surface_sides |= e.source_near_surface > 0 && e.target_near_surface > 0;
   }
-  available.model = source == ViewpointSource::model || target == ViewpointSource::model;
+  available.model = with_model(source, target);
   return available;
 }
 

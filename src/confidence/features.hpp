@@ -87,6 +87,11 @@ struct AvailableEvidence {
 AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes, ViewpointSource source,
                                      ViewpointSource target);
 
+/// One of the clouds is a model.
+inline bool with_model(ViewpointSource source, ViewpointSource target) {
+  return source == ViewpointSource::model || target == ViewpointSource::model;
+}
+
 /// Purpose of a regression.
 enum class Regressand : std::uint8_t {
   ranking,    ///< which mode of a pair is the best

@@ -108,6 +108,16 @@ TEST(DegeneracySearch, MorePosesWhereTheEvidenceIsOpen) {
   EXPECT_EQ(poses_at(5), 2u);
 }
 
+// The log odds of a scan on its model do not tell poses that are a few voxels apart.
+TEST(DegeneracySearch, AllPosesOnAModel) {
+  std::mt19937 random(3);
+  cpu::Exec exec(1);
+  const auto cloud = test::prepare_one(exec, test::raw_cloud(bare_corner(random, 40000)), {});
+  const PairOutcome outcome = test::verified_in_place(exec, *cloud, *cloud);
+  cloud->statistics.viewpoint = ViewpointSource::model;
+  EXPECT_EQ(perturbed(*cloud, *cloud, outcome, RegistrationSettings()).poses.size(), 8u);
+}
+
 TEST(DegeneracySearch, RotatesAboutTheCentreOfTheInliers) {
   std::mt19937 random(5);
   cpu::Exec exec(1);
