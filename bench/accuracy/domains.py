@@ -23,6 +23,7 @@ import sys
 import tempfile
 
 import numpy as np
+import fit_confidence
 import viewpoints
 from viewpoints import Cloud, Set
 
@@ -107,7 +108,7 @@ def evidence_of(command, scene, condition, seed, extra=()):
                 "status": found[i, j]["status"],
                 "points": [fragments[i]["points"], fragments[j]["points"]],
                 "viewpoints": [fragments[i]["viewpoint"], fragments[j]["viewpoint"]],
-                "refined": document["options"]["evidence"]["modes"],
+                "refined": fit_confidence.refined_modes(document["options"]),
                 "voxel_size": document["options"]["voxel_size"],
                 "modes": [
                     {k: m[k] for k in ("evidence", "confidence", "equivalent") if k in m}

@@ -139,6 +139,17 @@ def rows(evidence, chosen):
     return {key: values[chosen] for key, values in evidence.items()}
 
 
+def refined_modes(options):
+    """How many modes of a pair are refined, by the options of a result's JSON, also of an older gpureg."""
+    if "evidence" in options:
+        return options["evidence"]["modes"]
+    import gpureg
+
+    asked = gpureg.RegistrationOptions(quality=options["quality"])
+    asked.tune = options["tune"]
+    return library()._refined_modes(asked)
+
+
 def overlap_factor(overlap, source_points, target_points):
     """Factor on a confidence where few points overlap; arguments: (..., 2), and points of the
     prepared clouds.
@@ -170,7 +181,7 @@ class Run:
         modes = [p.get("modes", []) for p in pairs]
         if not any(modes):
             sys.exit(f"error: {result}: no pair has a mode with evidence")
-        self.refined = recorded["options"]["evidence"]["modes"]
+        self.refined = refined_modes(recorded["options"])
         self.keys = [(p["i"], p["j"]) for p in pairs]
         self.modes_per_pair = np.array([len(m) for m in modes])
         self.pair = np.repeat(np.arange(len(pairs)), self.modes_per_pair)

@@ -14,6 +14,7 @@
 #include "bindings.hpp"
 #include "confidence/features.hpp"
 #include "fields/evidence.hpp"
+#include "settings/resolve.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -164,7 +165,11 @@ void bind_confidence(py::module_& m) {
   m.def("_confidence_rank_features", &rank_features, "log_odds"_a, "own"_a, "modes_per_pair"_a,
         "refined"_a,
         "(modes, features): of modes among the others of their pair, 0 elsewhere. own: from "
-        "_confidence_features. refined: options.evidence.modes.");
+        "_confidence_features. refined: from _refined_modes.");
+  m.def(
+      "_refined_modes",
+      [](const RegistrationOptions& options) { return resolve(options).evidence.modes; },
+      "options"_a, "Modes of a pair that are refined and ranked.");
   m.def(
       "_confidence_factor", py::vectorize([](std::uint32_t points, std::uint32_t of) {
         return confidence::factor_of({points, of});

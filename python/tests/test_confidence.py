@@ -73,6 +73,12 @@ def corner(seed, boxes, points):
     return cloud[(cloud - 1.3) @ side > -0.5] + np.random.default_rng(seed).normal(size=3) * 1e-3
 
 
+def test_the_fit_knows_how_many_modes_were_ranked():
+    assert fit_confidence.refined_modes({"quality": 5, "tune": ""}) == 24
+    assert fit_confidence.refined_modes({"quality": 5, "tune": "evidence.modes=7"}) == 7
+    assert fit_confidence.refined_modes({"evidence": {"modes": 9}}) == 9  # before options were few
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_the_shipped_coefficients_make_the_confidences(name):
     model, regressions = MODELS[name], model_header.read_header(HEADER)[name]
@@ -106,7 +112,9 @@ def test_the_shipped_coefficients_make_the_confidences(name):
         np.testing.assert_allclose(
             (result.modes[0].confidence, result.modes[0].overlap_confidence),
             (confidence[0], overlapping[0]),
-            rtol=1e-9,
+            # On a model the pose is the one of its mode whose normals agree best, and has the
+            # confidence of the likeliest.
+            rtol=1e-3 if model.model else 1e-9,
             atol=1e-12,
         )
         ranking, verified = (
