@@ -7,7 +7,7 @@ than a tenth of the poses from a confidence of one half on are wrong. Logistic r
 alike ones, and of each the kinds, have the same weight, a set that of its poses. It prints how many sets, and
 poses, a fit on the other kinds calls alike.
 
-    fit_alike.py --gather ROWS.json KIND=SCENE_FOLDER ... [--backend cuda]    adds rows
+    fit_alike.py --gather ROWS.json KIND=SCENE_FOLDER ... [--backend cuda] [--no-viewpoints]    adds rows
     fit_alike.py ROWS.json [--write]    (src/reconstruction/audit/alike_model.hpp, and `kinds` of ROWS.json)
 
 SCENE_FOLDER has cloud_bin_<i>.ply, cameras.txt and poses.txt. Needs the package gpureg, numpy and scipy.
@@ -49,7 +49,7 @@ def is_wrong(pose, truth):
     return bool(np.linalg.norm(e[:3, 3]) > WRONG[0] or turn > WRONG[1])
 
 
-def gather(file, places, backend):
+def gather(file, places, backend, viewpoints):
     import gpureg
     from map_rmse import read_poses
 
@@ -62,12 +62,12 @@ def gather(file, places, backend):
         scene = gpureg.FragmentSet.from_directory(folder)
         truth, numbers = read_poses(folder / "poses.txt"), scene.numbers
         rows = [(s, t) for t in range(len(scene)) for s in range(t + 1, len(scene))]
-        with_cameras = [gpureg.read_cameras(folder / "cameras.txt")[n] for n in numbers]
+        paths = [folder / name for name in scene.names]
+        cameras = gpureg.read_cameras(folder / "cameras.txt") if viewpoints else {}
+        scene = gpureg.FragmentSet(numbers, paths, cameras, scene.names)
         clouds = [
-            gpureg.prepare(
-                folder / scene.names[k], viewpoints=cameras, options=options, context=context
-            )
-            for k, cameras in enumerate(with_cameras)
+            gpureg.prepare(path, viewpoints=cameras.get(n), options=options, context=context)
+            for path, n in zip(paths, numbers)
         ]
         results = gpureg.align_batch(clouds, rows, options=options, context=context)
         wrong = [
@@ -93,6 +93,7 @@ def gather(file, places, backend):
                     "kind": kind,
                     "scene": folder.name,
                     "subset": name,
+                    "viewpoints": viewpoints,
                     "contradicted": round(contradicted, 5),
                     "edges_per_scan": round(edges_per_scan, 3),
                     "jumps": round(jumps, 4),
@@ -143,10 +144,13 @@ def main():
     parser.add_argument("places", nargs="*", metavar="KIND=SCENE_FOLDER")
     parser.add_argument("--gather", action="store_true")
     parser.add_argument("--backend", choices=("cpu", "cuda"), default="cpu")
+    parser.add_argument("--no-viewpoints", action="store_true", help="gather: points alone")
     parser.add_argument("--write", action="store_true")
     arguments = parser.parse_args()
     if arguments.gather:
-        return gather(arguments.rows, arguments.places, arguments.backend)
+        return gather(
+            arguments.rows, arguments.places, arguments.backend, not arguments.no_viewpoints
+        )
     rows = json.loads(arguments.rows.read_text())["sets"]
     kinds = []
     alike = alike_scenes(rows)
