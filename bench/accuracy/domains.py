@@ -22,8 +22,8 @@ import subprocess
 import sys
 import tempfile
 
-import numpy as np
 import fit_confidence
+import numpy as np
 import viewpoints
 from viewpoints import Cloud, Set
 

@@ -271,6 +271,11 @@ TEST(ScaledMap, SaysWhatIsWrong) {
       [&] { reconstruction::find_scales(context, fragments, ScaleRange::known(2)); }, {"known"});
   expect_error<InvalidArgument>([&] { reconstruction::find_scales(context, fragments, {3, 2}); },
                                 {"scale"});
+  expect_error<InvalidArgument>(
+      [&] {
+        reconstruction::find_scales(context, fragments, {}, RegistrationOptions::loopsmart(0.1f));
+      },
+      {"method"});
   reconstruction::MapOptions options;
   options.journal = "/tmp/pairs.journal";
   expect_error<InvalidArgument>(
@@ -288,6 +293,22 @@ TEST(ScaledMap, UnreadableFragmentsArePartsOfTheirOwn) {
     EXPECT_EQ(found[k].part, k);
     EXPECT_EQ(found[k].scale, 1);
   }
+}
+
+TEST(ScaledMap, ACloudThatCannotBePreparedCostsItsOwnPairs) {
+  const ScaledRooms rooms;
+  const FragmentsOf fragments({"0", "far", "1"}, [&](std::size_t k) {
+    PointCloud cloud;
+    cloud.points = rooms.clouds[k == 2 ? 1 : 0];
+    if (k == 1)
+      for (Eigen::Vector3f& p : cloud.points) p *= 1e30f;
+    return cloud;
+  });
+  const auto found = reconstruction::find_scales(Context::cpu(2), fragments, {1.2, 1.8},
+                                                 RegistrationOptions{0.1f});
+  EXPECT_EQ(found[0].part, found[2].part);
+  EXPECT_NE(found[0].part, found[1].part);
+  EXPECT_NEAR(found[2].scale / rooms.factors[1], 1, 0.02);
 }
 
 TEST(ScaledMap, CanBeCancelled) {

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "common/stop_scope.hpp"
+#include "common/validate.hpp"
 #include "gpureg/reconstruction/scales.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "math/exponential.hpp"
@@ -54,10 +55,15 @@ class Clouds {
   std::size_t points_ = 0;
 };
 
+/// A pair of a cloud that cannot be prepared has no candidates.
 SearchedPair searched(const Context& context, std::size_t source, std::size_t target,
                       const PointCloudView& moved, const PointCloudView& fixed,
                       const ScaleRange& range, const RegistrationOptions& options) {
-  const ScaledResult result = align_scaled_auto(context, moved, fixed, range, options);
+  ScaledResult result;
+  try {
+    result = align_scaled_auto(context, moved, fixed, range, options);
+  } catch (const InvalidArgument&) {  // its map says why
+  }
   SearchedPair out{source, target, {}, result.scale_deviation};
   const bool any =
       result.scale_status == ScaleStatus::found || result.scale_status == ScaleStatus::ambiguous;
@@ -75,6 +81,8 @@ std::vector<ScanScale> find_scales(const Context& context, const FragmentSet& fr
   range.validate();
   options.validate();
   if (range.is_known()) throw InvalidArgument("scale: known, expected free or a range");
+  require(options.method == RegistrationMethod::compatibility, "method", to_string(options.method),
+          "compatibility: only it can search the scale");
   const std::size_t count = fragments.size(), all = count * (count - (count > 0)) / 2;
   Clouds clouds(fragments, options);
   std::vector<SearchedPair> pairs;
