@@ -1711,6 +1711,7 @@ def find_scales(
     least: float,
     most: float,
     options: RegistrationOptions,
+    journal: str,
     progress: Callable[[int, int], object] | None,
 ) -> list[tuple[float, int]]: ...
 

@@ -64,8 +64,8 @@ def reconstruct(
         numbers, with a 6x6 information matrix as a fourth entry if it is known.
     scale : "free" or (least, most), optional
         Each scan has an unknown scale of its own, see `Map.scales`; a range is that of any later
-        scan to an earlier one. Without results and journal; poses are those of the scaled scans,
-        and so is ``odometry``.
+        scan to an earlier one. Without results; poses are those of the scaled scans, and so is
+        ``odometry``. A journal keeps the pairs that were searched.
     audit : bool
         Ask the scans whether they contradict each other where the map puts them, and take edges
         out that cannot be right. Clouds are needed, and prepared if `results` are given.
@@ -117,14 +117,18 @@ def reconstruct(
     context = context_of(context)
     fragments = fragment_set(fragments)
     fragments.check_files()
-    if scale is not None and (results is not None or journal is not None):
-        raise TypeError("scale: not together with results or a journal")
+    if scale is not None and results is not None:
+        raise TypeError("scale: not together with results")
     rows, values = _pair_results(fragments, pairs, results)
     known = next((value.voxel_size for value in values or () if value.voxel_size), 0)
     if known == 0 and journal is not None:
         known = _core.voxel_size_of_journal(os.fspath(journal))
-    found = None if scale is None else _find_scales(fragments, scale, options, context, progress)
     source = fragments._core(fingerprints=journal is not None)
+    found, searched = None, ""
+    if scale is not None:
+        # The journal is of the search alone: the map takes less time.
+        searched, journal = os.fspath(journal or ""), None
+        found = _find_scales(source, len(fragments), scale, options, context, searched, progress)
     if found is not None:
         fragments = fragments.scaled([s for s, _ in found])
     options = options_for(options, fragments, known)
@@ -146,6 +150,8 @@ def reconstruct(
         steps.close()
     if found is not None:
         fragments = fragments.scaled(made["scales"])
+    if searched:
+        os.remove(searched)
     unusable = made["unusable"]
     usable = fragments.without(unusable) if unusable else fragments
     audited = None if made["audit"] is None else Audit._of(made["audit"], usable.numbers)
@@ -162,22 +168,25 @@ def reconstruct(
 
 
 def _find_scales(
-    fragments: FragmentSet,
+    source: _core.FragmentSource,
+    count: int,
     scale: Any,
     options: RegistrationOptions | None,
     context: Context,
+    journal: str,
     progress: Progress,
 ) -> list[tuple[float, int]]:
     """(scale, part) of each fragment."""
-    total = len(fragments) * (len(fragments) - 1) // 2
+    total = count * (count - 1) // 2
     least, most = scale_range(scale)
     with batch_progress(progress, "finding scales", total) as report:
         return _core.find_scales(
             context,
-            fragments._core(),
+            source,
             least,
             most,
             options or RegistrationOptions(),
+            journal,
             None if report is None else lambda done, _: report(done),
         )
 

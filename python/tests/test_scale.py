@@ -121,8 +121,20 @@ def test_scans_of_one_unknown_scale_each_become_one_map(tmp_path):
     points, _ = found.points(voxel_size=0.1)
     assert np.abs(points.max(0) - _room(1).max(0)).max() < 0.15  # one room, in the first's unit
     assert gpureg.reconstruct(clouds[:1] * 2, options=options, refine=False).scales is None
-    with pytest.raises(TypeError, match="journal"):
-        gpureg.reconstruct(clouds, scale="free", journal=tmp_path / "pairs.journal")
+    journal = tmp_path / "scales.journal"
+
+    def interrupt(done, total):
+        if total == 3 and done == 2:
+            raise KeyboardInterrupt
+
+    rest = {"scale": (0.5, 2), "options": options, "refine": False, "journal": journal}
+    with pytest.raises(KeyboardInterrupt):
+        gpureg.reconstruct(clouds, progress=interrupt, **rest)
+    assert journal.exists()
+    again = gpureg.reconstruct(clouds, **rest)
+    assert np.array_equal(again.scales, found.scales) and not journal.exists()
+    with pytest.raises(TypeError, match="results"):
+        gpureg.reconstruct(clouds, [(0, 1)], scale="free", results=[])
     with pytest.raises(ValueError, match="scale"):
         gpureg.reconstruct(clouds, scale=(2, 1))
     with pytest.raises(gpureg.InvalidArgument, match="known"):

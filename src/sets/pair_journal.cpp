@@ -259,15 +259,22 @@ RegistrationResult PairJournal::result(std::size_t k) {
   return result_in(fd_, path_, places_[k].at, places_[k].size);
 }
 
+std::string PairJournal::bytes(std::size_t k) {
+  if (!done(k)) return {};
+  if (!pending_.empty()) flush();
+  return read_part(fd_, path_, places_[k].at, places_[k].size);
+}
+
 void PairJournal::add(std::size_t k, const RegistrationResult& result) {
+  if (fd_ >= 0) return add_bytes(k, bytes_of(result));
   ++done_;
-  if (fd_ < 0) {
-    kept_[k] = result;
-    places_[k].size = 1;
-    return;
-  }
+  kept_[k] = result;
+  places_[k].size = 1;
+}
+
+void PairJournal::add_bytes(std::size_t k, const std::string& bytes) {
+  ++done_;
   const std::uint32_t numbers[] = {number_of_[pairs_[k].target], number_of_[pairs_[k].source]};
-  const std::string bytes = bytes_of(result);
   append(kPair, std::string(files::bytes_of(numbers, 2)) + bytes);
   places_[k] = {end_ - sizeof(std::uint64_t) - bytes.size(),
                 static_cast<std::uint32_t>(bytes.size())};

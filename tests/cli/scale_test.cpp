@@ -99,6 +99,7 @@ TEST(Scale, IsOfEachScanOfAMap) {
     EXPECT_NEAR(scale_of(edge["T_ij"]), scale("j") / scale("i"), 1e-9);
   }
   EXPECT_FALSE(std::filesystem::exists(out / "pairs.json"));  // of scaled scans
+  EXPECT_FALSE(std::filesystem::exists(out / "pairs.journal"));
 }
 
 TEST(Scale, RefusesWhatIsNone) {

@@ -11,6 +11,7 @@
 #include "reconstruction/scales/similarity_graph.hpp"
 #include "support/expect_error.hpp"
 #include "support/scan.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -201,16 +202,16 @@ TEST(ScaledMap, OfScansInUnitsOfTheirOwn) {
   const ScaledRooms rooms;
   const FragmentsOf fragments = rooms.fragments();
   const Context context = Context::cpu(2);
-  const ScaleRange range{0.5, 2};
   std::size_t told = 0, total = 0;
-  reconstruction::ScaleCallbacks callbacks;
-  callbacks.on_progress = [&](std::size_t done, std::size_t all) {
+  reconstruction::ScaleSearch search;
+  search.range = {0.5, 2};
+  search.on_progress = [&](std::size_t done, std::size_t all) {
     EXPECT_GE(done, told);
     told = done;
     total = all;
   };
   const auto found =
-      reconstruction::find_scales(context, fragments, range, RegistrationOptions{0.1f}, callbacks);
+      reconstruction::find_scales(context, fragments, RegistrationOptions{0.1f}, search).scans;
   EXPECT_EQ(told, 6u);
   EXPECT_EQ(total, 6u);
   ASSERT_EQ(found.size(), rooms.factors.size());
@@ -268,12 +269,13 @@ TEST(ScaledMap, SaysWhatIsWrong) {
   expect_error<InvalidArgument>([&] { reconstruction::ScaledFragments(fragments, {1, 0}); },
                                 {"scales[1]", "0"});
   expect_error<InvalidArgument>(
-      [&] { reconstruction::find_scales(context, fragments, ScaleRange::known(2)); }, {"known"});
-  expect_error<InvalidArgument>([&] { reconstruction::find_scales(context, fragments, {3, 2}); },
-                                {"scale"});
+      [&] { reconstruction::find_scales(context, fragments, {}, {ScaleRange::known(2)}); },
+      {"known"});
+  expect_error<InvalidArgument>(
+      [&] { reconstruction::find_scales(context, fragments, {}, {ScaleRange{3, 2}}); }, {"scale"});
   expect_error<InvalidArgument>(
       [&] {
-        reconstruction::find_scales(context, fragments, {}, RegistrationOptions::loopsmart(0.1f));
+        reconstruction::find_scales(context, fragments, RegistrationOptions::loopsmart(0.1f));
       },
       {"method"});
   reconstruction::MapOptions options;
@@ -288,7 +290,7 @@ TEST(ScaledMap, UnreadableFragmentsArePartsOfTheirOwn) {
     if (k == 1) throw IoError("b is gone");
     return {};
   });
-  const auto found = reconstruction::find_scales(Context::cpu(1), fragments);
+  const auto found = reconstruction::find_scales(Context::cpu(1), fragments).scans;
   for (std::uint32_t k = 0; k < 3; ++k) {
     EXPECT_EQ(found[k].part, k);
     EXPECT_EQ(found[k].scale, 1);
@@ -304,18 +306,56 @@ TEST(ScaledMap, ACloudThatCannotBePreparedCostsItsOwnPairs) {
       for (Eigen::Vector3f& p : cloud.points) p *= 1e30f;
     return cloud;
   });
-  const auto found = reconstruction::find_scales(Context::cpu(2), fragments, {1.2, 1.8},
-                                                 RegistrationOptions{0.1f});
+  const auto found = reconstruction::find_scales(Context::cpu(2), fragments,
+                                                 RegistrationOptions{0.1f}, {ScaleRange{1.2, 1.8}})
+                         .scans;
   EXPECT_EQ(found[0].part, found[2].part);
   EXPECT_NE(found[0].part, found[1].part);
   EXPECT_NEAR(found[2].scale / rooms.factors[1], 1, 0.02);
 }
 
+TEST(ScaledMap, ASearchGoesOnWhereItStopped) {
+  const ScaledRooms rooms;
+  const TemporaryFolder folder;
+  const Context context = Context::cpu(2);
+  const RegistrationOptions options{0.1f};
+  reconstruction::ScaleSearch search;
+  search.range = {0.5, 2};
+  search.journal = folder / "scales.journal";
+  std::size_t done = 0;
+  search.on_progress = [&](std::size_t now, std::size_t) { done = now; };
+  search.should_stop = [&] { return done >= 2; };
+  EXPECT_THROW(reconstruction::find_scales(context, rooms.fragments(), options, search),
+               reconstruction::Cancelled);
+  search.should_stop = {};
+  const auto resumed = reconstruction::find_scales(context, rooms.fragments(), options, search);
+  EXPECT_LT(resumed.searched, 6u);
+  resumed.journal->remove();
+  search.journal.clear();
+  const auto whole = reconstruction::find_scales(context, rooms.fragments(), options, search);
+  EXPECT_EQ(whole.searched, resumed.searched + 2);
+  EXPECT_EQ(whole.journal, nullptr);
+  for (std::size_t k = 0; k < whole.scans.size(); ++k)
+    EXPECT_EQ(whole.scans[k].scale, resumed.scans[k].scale);
+  // Another range is another run.
+  search.journal = folder / "scales.journal";
+  search.on_progress = [&](std::size_t, std::size_t) { done = 100; };
+  done = 0;
+  search.should_stop = [&] { return done == 100; };
+  EXPECT_THROW(reconstruction::find_scales(context, rooms.fragments(), options, search),
+               reconstruction::Cancelled);
+  search.should_stop = {};
+  search.range = {0.4, 2};
+  expect_error<InvalidArgument>(
+      [&] { reconstruction::find_scales(context, rooms.fragments(), options, search); },
+      {"scale was 0.5:2"});
+}
+
 TEST(ScaledMap, CanBeCancelled) {
   const ScaledRooms rooms;
-  reconstruction::ScaleCallbacks callbacks;
-  callbacks.should_stop = [] { return true; };
-  EXPECT_THROW(reconstruction::find_scales(Context::cpu(2), rooms.fragments(), {}, {}, callbacks),
+  reconstruction::ScaleSearch search;
+  search.should_stop = [] { return true; };
+  EXPECT_THROW(reconstruction::find_scales(Context::cpu(2), rooms.fragments(), {}, search),
                reconstruction::Cancelled);
 }
 

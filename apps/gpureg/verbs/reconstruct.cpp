@@ -98,8 +98,7 @@ void check_scale(const ReconstructOptions& o) {
     throw InvalidArgument("--scale is " + o.scale.text +
                           ", expected free or MIN:MAX: each scan of a map has a scale of its own");
   for (const auto& [given, name] :
-       {std::pair(!o.results.empty(), "--results"), std::pair(!o.odometry.empty(), "--odometry"),
-        std::pair(o.resume.resume, "--resume"), std::pair(o.resume.restart, "--restart")})
+       {std::pair(!o.results.empty(), "--results"), std::pair(!o.odometry.empty(), "--odometry")})
     if (given) throw InvalidArgument(std::string("--scale and ") + name + " do not go together");
 }
 
@@ -160,8 +159,7 @@ class Reconstruct {
     }
     progress_.end();
     if (!write_outputs()) return say_interrupted();
-    if (run_.made.journal && !o_.scale.given())
-      ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
+    if (run_.made.journal) ResumeOptions::close(*run_.made.journal, run_.scene, o_.quiet);
     if (!o_.quiet) {
       std::cout << "voxel size " << o_.method.voxel_size_text() << "\n";
       std::cout << map_summary(run_, context_);
@@ -173,30 +171,38 @@ class Reconstruct {
  private:
   /// Finds the scales of the scans, then makes the map of the scaled scans.
   void make_scaled(const reconstruction::MapInput& known) {
-    reconstruction::ScaleCallbacks callbacks_of_search;
+    reconstruction::ScaleSearch search;
+    search.range = o_.scale.range();
+    search.journal = o_.journal();
+    search.journal_mode = o_.resume.mode();
     std::optional<Progress> progress;
-    callbacks_of_search.on_progress = [&](std::size_t done, std::size_t total) {
+    search.on_progress = [&](std::size_t done, std::size_t total) {
       if (!progress) progress.emplace("finding scales", "pairs", total, o_.quiet);
       progress->update(done);
     };
-    callbacks_of_search.should_stop = InterruptGuard::requested;
-    const std::vector<reconstruction::ScanScale> found = reconstruction::find_scales(
-        context_, set_, o_.scale.range(), run_.options, callbacks_of_search);
+    search.should_stop = InterruptGuard::requested;
+    reconstruction::FoundScales found;
+    o_.resume.with(o_.journal(), [&] {
+      found = reconstruction::find_scales(context_, set_, run_.options, search);
+    });
     progress.reset();
+    if (!o_.quiet) o_.resume.tell(o_.journal(), found.journal->resumed(), found.journal->size());
     std::vector<double> scales;
-    for (const reconstruction::ScanScale& scan : found) scales.push_back(scan.scale);
+    for (const reconstruction::ScanScale& scan : found.scans) scales.push_back(scan.scale);
     choose_voxel_size_of(scales);
     const auto guesses =
-        std::count_if(found.begin(), found.end(), [](const auto& scan) { return scan.part > 0; });
+        std::count_if(found.scans.begin(), found.scans.end(),
+                      [](const reconstruction::ScanScale& scan) { return scan.part > 0; });
     if (guesses > 0 && !o_.quiet)
-      std::cerr << "gpureg: note: no pair tells the scale of " << guesses << " of " << found.size()
-                << " scans to the first one" << std::endl;
+      std::cerr << "gpureg: note: no pair tells the scale of " << guesses << " of "
+                << found.scans.size() << " scans to the first one" << std::endl;
     reconstruction::MapOptions map_options = options();
     map_options.journal.clear();
     reconstruction::ScaledMapOfSet map =
         reconstruction::reconstruct_scaled(context_, set_, scales, known, map_options, callbacks());
     run_.made = std::move(map.made);
     for (const std::size_t k : run_.made.scans) run_.scales.push_back(map.scales[k]);
+    run_.made.journal = std::move(found.journal);
   }
 
   /// That of some scaled scans.
@@ -252,7 +258,7 @@ class Reconstruct {
     callbacks.on_progress = [this](reconstruction::MapStep step, std::size_t done,
                                    std::size_t total) {
       if (step == reconstruction::MapStep::align) {
-        if (!pairs_ && !o_.quiet) o_.resume.tell(o_.journal(), done, total);
+        if (!pairs_ && !o_.quiet && !o_.scale.given()) o_.resume.tell(o_.journal(), done, total);
         pairs_ = {done, total};
       }
       progress_.update(step, done, total);
@@ -314,7 +320,9 @@ class Reconstruct {
   int say_interrupted() {
     progress_.end();
     std::cerr << "gpureg: interrupted";
-    if (pairs_ && !o_.scale.given())
+    if (o_.scale.given())
+      std::cerr << "; go on with the same command and --resume";
+    else if (pairs_)
       std::cerr << ", " << pairs_->first << " of " << pairs_->second
                 << " pairs are in the journal; go on with the same command and --resume";
     else

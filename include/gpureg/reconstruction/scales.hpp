@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -23,25 +24,36 @@ struct ScanScale {
   std::uint32_t part = 0;
 };
 
-struct ScaleCallbacks {
-  /// Pairs that were searched so far, and at most.
-  std::function<void(std::size_t done, std::size_t total)> on_progress;
+/// How the scales of a set are searched.
+struct ScaleSearch {
+  /// Of every pair: scales of the later scan to the earlier one.
+  ScaleRange range = {};
+  /// File from which an interrupted search goes on; empty: none.
+  std::string journal = {};
+  PairJournal::Mode journal_mode = PairJournal::Mode::resume;
+  /// Pairs that were searched or need not be, and all.
+  std::function<void(std::size_t done, std::size_t total)> on_progress = {};
   /// Polled several times a second; true ends the call, which throws Cancelled.
-  std::function<bool()> should_stop;
+  std::function<bool()> should_stop = {};
+};
+
+/// What find_scales() finds.
+struct FoundScales {
+  std::vector<ScanScale> scans;          ///< one per fragment
+  std::size_t searched = 0;              ///< pairs that this call searched
+  std::unique_ptr<PairJournal> journal;  ///< remove() it when the map is complete
 };
 
 /// Finds the scales of a set. Pairs are searched with align_scaled_auto(), neighbours in the order
 /// of the set first, until loops of pairs confirm the scale of every scan, or all have been
 /// searched; a graph of the logarithms of the scales tells wrong pairs from right ones.
-/// @param range of every pair: scales of the later scan to the earlier one.
 /// @param options as for align_scaled_auto().
-/// @return one entry per fragment; one that cannot be read is a part of its own.
-/// @throws InvalidArgument for a range that is none or known, and as align_scaled_auto();
-/// Cancelled.
-std::vector<ScanScale> find_scales(const Context& context, const FragmentSet& fragments,
-                                   const ScaleRange& range = {},
-                                   const RegistrationOptions& options = {},
-                                   const ScaleCallbacks& callbacks = {});
+/// @return the scales; a fragment that cannot be read is a part of its own. The same after an
+///   interruption.
+/// @throws InvalidArgument for a range that is none or known, and as align_scaled_auto(); as
+///   PairJournal; Cancelled.
+FoundScales find_scales(const Context& context, const FragmentSet& fragments,
+                        const RegistrationOptions& options = {}, const ScaleSearch& search = {});
 
 /// The fragments of another set, each multiplied by a factor.
 class ScaledFragments : public FragmentSet {

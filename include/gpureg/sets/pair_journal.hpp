@@ -98,6 +98,11 @@ class PairJournal {
   void add(std::size_t k, const RegistrationResult& result);
   void flush();
 
+  /// Bytes of the caller's instead of a result: of a run whose settings say so, with a file. What
+  /// is done is not empty.
+  void add_bytes(std::size_t k, const std::string& bytes);
+  std::string bytes(std::size_t k);
+
   /// A number that the caller noted last, about what the outputs of the run are; none: nothing
   /// noted yet.
   const std::optional<std::uint64_t>& note() const { return note_; }

@@ -134,18 +134,18 @@ py::dict report_of(const RefineReport& report) {
 }
 
 /// [(scale, part)] of each fragment. progress: called with (done, total).
-std::vector<std::pair<double, std::uint32_t>> scales_of(const Context& context,
-                                                        const PythonSet& set, double least,
-                                                        double most,
-                                                        const RegistrationOptions options,
-                                                        const py::object& progress) {
+std::vector<std::pair<double, std::uint32_t>> scales_of(
+    const Context& context, const PythonSet& set, double least, double most,
+    const RegistrationOptions options, const std::string& journal, const py::object& progress) {
   Teller tell(progress);
-  ScaleCallbacks callbacks;
-  callbacks.on_progress = [&](std::size_t done, std::size_t total) { tell(done, total); };
-  callbacks.should_stop = [&] { return !tell.check(); };
+  ScaleSearch search;
+  search.range = {least, most};
+  search.journal = journal;
+  search.on_progress = [&](std::size_t done, std::size_t total) { tell(done, total); };
+  search.should_stop = [&] { return !tell.check(); };
   std::vector<std::pair<double, std::uint32_t>> out;
   tell.run([&] {
-    for (const ScanScale& scan : find_scales(context, set, {least, most}, options, callbacks))
+    for (const ScanScale& scan : find_scales(context, set, options, search).scans)
       out.emplace_back(scan.scale, scan.part);
   });
   return out;
@@ -293,7 +293,7 @@ void bind_reconstruction(py::module_& m) {
         py::arg("pairs"), py::arg("results"), py::arg("odometry"), py::arg("options"),
         py::arg("scales"), py::arg("progress"));
   m.def("find_scales", &scales_of, py::arg("context"), py::arg("fragments"), py::arg("least"),
-        py::arg("most"), py::arg("options"), py::arg("progress"));
+        py::arg("most"), py::arg("options"), py::arg("journal"), py::arg("progress"));
   bind_audit(m);
   bind_voxel_map(m);
 }
