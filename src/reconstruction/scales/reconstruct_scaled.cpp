@@ -20,6 +20,7 @@ namespace {
 constexpr int kMapsBefore = 2;
 /// A scale that differs by more from the one of the map is that of another pose.
 constexpr double kMostOfEdge = 0.1;
+
 /// The edge with a free scale, from its pose in the map's set.
 SimilarityEdge edge_of(const Edge& edge, const scale::RefinedScale& refined) {
   SimilarityEdge out;
