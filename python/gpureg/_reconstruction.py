@@ -121,7 +121,7 @@ def reconstruct(
         raise TypeError("scale: not together with results")
     rows, values = _pair_results(fragments, pairs, results)
     known = next((value.voxel_size for value in values or () if value.voxel_size), 0)
-    if known == 0 and journal is not None:
+    if known == 0 and journal is not None and scale is None:  # else it is of the search
         known = _core.voxel_size_of_journal(os.fspath(journal))
     source = fragments._core(fingerprints=journal is not None)
     found, searched = None, ""

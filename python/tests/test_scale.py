@@ -127,12 +127,15 @@ def test_scans_of_one_unknown_scale_each_become_one_map(tmp_path):
         if total == 3 and done == 2:
             raise KeyboardInterrupt
 
-    rest = {"scale": (0.5, 2), "options": options, "refine": False, "journal": journal}
+    # In the voxels that the scaled scans suggest, also when it goes on.
+    rest = {"scale": (0.5, 2), "refine": False}
+    whole = gpureg.reconstruct(clouds, **rest)
     with pytest.raises(KeyboardInterrupt):
-        gpureg.reconstruct(clouds, progress=interrupt, **rest)
+        gpureg.reconstruct(clouds, progress=interrupt, journal=journal, **rest)
     assert journal.exists()
-    again = gpureg.reconstruct(clouds, **rest)
-    assert np.array_equal(again.scales, found.scales) and not journal.exists()
+    again = gpureg.reconstruct(clouds, journal=journal, **rest)
+    assert np.array_equal(again.scales, whole.scales) and not journal.exists()
+    assert np.array_equal(again.poses, whole.poses)
     with pytest.raises(TypeError, match="results"):
         gpureg.reconstruct(clouds, [(0, 1)], scale="free", results=[])
     with pytest.raises(ValueError, match="scale"):

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+
 namespace gpureg::scale {
 
 /// A scale that refinement changes by less is not prepared again.
@@ -24,8 +26,6 @@ constexpr float kReach = 2;
 /// The same for the source, whose scale may be smaller than that of its points.
 constexpr float kReachOfSource = 1.5f * kReach;
 
-inline double odds_of(double confidence) {
-  return confidence / (confidence < 1 - 1e-9 ? 1 - confidence : 1e-9);
-}
+inline double odds_of(double confidence) { return confidence / std::max(1e-9, 1 - confidence); }
 
 }  // namespace gpureg::scale

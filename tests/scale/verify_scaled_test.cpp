@@ -6,7 +6,6 @@
 
 #include "gpureg/registration/scale.hpp"
 #include "support/expect_error.hpp"
-#include "support/result_bytes.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg {
@@ -95,13 +94,21 @@ TEST_F(ScaledPoses, RefinesPoseAndScale) {
 }
 
 TEST_F(ScaledPoses, TwoScalesShareWhatTheyAreWorth) {
-  // The same cloud at two scales within what evidence can tell: neither is certain.
-  const auto alone = verified({similarity(kFactor)});
-  const auto both = verified({similarity(kFactor), similarity(1.035 * kFactor)});
-  const double rival = verified({similarity(1.035 * kFactor)})[0].verification.confidence;
-  const double own = alone[0].verification.confidence;
-  const double shared = (own / (1 - own)) / (own / (1 - own) + rival / (1 - rival));
-  EXPECT_NEAR(both[0].verification.confidence, std::min(own, shared), 1e-9);
+  // The target holds the room twice, once half as large again.
+  const std::size_t count = target.size();
+  const Eigen::Vector3f aside(30, 0, 0);
+  for (std::size_t k = 0; k < count; ++k) target.push_back(1.5f * target[k] + aside);
+  UnalignedMatrix4d larger = similarity(1.5 * kFactor);
+  larger.col(3).head<3>() *= 1.5;
+  larger.col(3).head<3>() += aside.cast<double>();
+  const double first = verified({similarity(kFactor)})[0].verification.confidence,
+               second = verified({larger})[0].verification.confidence;
+  EXPECT_GT(first, 0.8);
+  EXPECT_GT(second, 0.8);
+  const auto both = verified({similarity(kFactor), larger});
+  const auto odds = [](double p) { return p / (1 - p); };
+  EXPECT_NEAR(both[0].verification.confidence, odds(first) / (odds(first) + odds(second)), 1e-9);
+  EXPECT_NEAR(both[1].verification.confidence, odds(second) / (odds(first) + odds(second)), 1e-9);
 }
 
 TEST_F(ScaledPoses, HasTheSameBitsOnAnyThreads) {

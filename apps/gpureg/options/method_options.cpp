@@ -154,17 +154,29 @@ void MethodOptions::choose_voxel_size(const ScanInput& input, const std::string&
   if (!automatic_voxel_size) return;
   const std::string of_run = PairJournal::setting(journal, "options.voxel_size");
   if (!of_run.empty()) return take_voxel_size(std::strtof(of_run.c_str(), nullptr));
-  constexpr std::size_t kMost = 8;
   const std::vector<io::ScanFile> scans = input.list(true);
-  const std::size_t count = std::min(scans.size(), kMost);
-  std::vector<PointCloud> clouds;
+  choose_voxel_size(
+      scans.size(),
+      [&](std::size_t k) { return LoadedCloud(read_cloud(scans[k].path, 0, MeshNote::none)); },
+      input.path);
+}
+
+void MethodOptions::choose_voxel_size(std::size_t scans,
+                                      const std::function<LoadedCloud(std::size_t)>& read,
+                                      const std::string& what) {
+  if (!automatic_voxel_size) return;
+  constexpr std::size_t kMost = 8;
+  const std::size_t count = std::min(scans, kMost);
+  std::vector<LoadedCloud> clouds;
+  std::vector<PointCloudView> views;
   for (std::size_t k = 0; k < count; ++k) try {
-      clouds.push_back(read_cloud(scans[k * scans.size() / count].path, 0, MeshNote::none));
+      clouds.push_back(read(k * scans / count));
+      views.push_back(clouds.back().view);
     } catch (const IoError&) {
       // One that cannot be read is left out of the run, and named there.
       if (k + 1 == count && clouds.empty()) throw;
     }
-  choose_voxel_size(views_of(clouds), input.path);
+  choose_voxel_size(views, what);
 }
 
 void MethodOptions::check_sizes(float used, const PreparedSizes& sizes, bool quiet) const {

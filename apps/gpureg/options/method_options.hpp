@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,6 +56,10 @@ struct MethodOptions {
   /// The same by some scans of a folder, evenly chosen; the size of an earlier run if it has a
   /// journal, which says it.
   void choose_voxel_size(const ScanInput& input, const std::string& journal = "");
+
+  /// The same by some of so many scans, which read(k) reads.
+  void choose_voxel_size(std::size_t scans, const std::function<LoadedCloud(std::size_t)>& read,
+                         const std::string& what);
 
   /// Sets the voxel size of what there is already, as of a map.
   void take_voxel_size(float size) {

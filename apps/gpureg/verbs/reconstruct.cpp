@@ -189,7 +189,10 @@ class Reconstruct {
     if (!o_.quiet) o_.resume.tell(o_.journal(), found.journal->resumed(), found.journal->size());
     std::vector<double> scales;
     for (const reconstruction::ScanScale& scan : found.scans) scales.push_back(scan.scale);
-    choose_voxel_size_of(scales);
+    const reconstruction::ScaledFragments scaled(set_, scales);
+    o_.method.choose_voxel_size(
+        scaled.size(), [&](std::size_t k) { return scaled.read(k, run_.options); }, o_.input.path);
+    run_.options = o_.method.registration();
     const auto guesses =
         std::count_if(found.scans.begin(), found.scans.end(),
                       [](const reconstruction::ScanScale& scan) { return scan.part > 0; });
@@ -203,23 +206,6 @@ class Reconstruct {
     run_.made = std::move(map.made);
     for (const std::size_t k : run_.made.scans) run_.scales.push_back(map.scales[k]);
     run_.made.journal = std::move(found.journal);
-  }
-
-  /// That of some scaled scans.
-  void choose_voxel_size_of(const std::vector<double>& scales) {
-    if (!o_.method.automatic_voxel_size) return;
-    const reconstruction::ScaledFragments scaled(set_, scales);
-    constexpr std::size_t kMost = 8;
-    const std::size_t count = std::min(scaled.size(), kMost);
-    std::vector<LoadedCloud> clouds;
-    std::vector<PointCloudView> views;
-    for (std::size_t k = 0; k < count; ++k) try {
-        clouds.push_back(scaled.read(k * scaled.size() / count, run_.options));
-        views.push_back(clouds.back().view);
-      } catch (const IoError&) {  // the map names it
-      }
-    o_.method.choose_voxel_size(views, o_.input.path);
-    run_.options = o_.method.registration();
   }
 
   reconstruction::MapInput input() const {

@@ -44,10 +44,12 @@ class Clouds {
         }
       points_ += cloud.view.size;
       return &read_.emplace(k, std::move(cloud)).first->second;
-    } catch (const Error&) {  // its map says why
+    } catch (const IoError&) {
       readable_[k] = 0;
-      return nullptr;
+    } catch (const InvalidArgument&) {
+      readable_[k] = 0;
     }
+    return nullptr;  // the map says why
   }
 
  private:

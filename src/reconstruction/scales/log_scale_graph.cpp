@@ -13,7 +13,8 @@
 namespace gpureg::reconstruction {
 namespace {
 
-constexpr double kNeverSurer = 0.999;  // as for the poses of a map
+/// A confidence of 1 would always be accepted.
+constexpr double kNeverSurer = 0.999;
 
 using PairOfScans = std::pair<int, int>;
 
