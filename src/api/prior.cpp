@@ -13,7 +13,6 @@
 namespace gpureg {
 namespace {
 
-constexpr double kRadians = 3.14159265358979323846 / 180.0;
 /// Widens the limits by the rounding of directions and poses to float: poses exactly at a limit
 /// must pass.
 constexpr double kRounding = 1e-6;
@@ -67,8 +66,8 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
     const Eigen::Vector3d s = gravity->source_up.normalized(), t = gravity->target_up.normalized();
     out.moved_up = to_vec3(swapped ? t : s);
     out.fixed_up = to_vec3(swapped ? s : t);
-    out.min_up_cosine =
-        static_cast<float>(portable::cos(gravity->max_angle * kRadians) - kRounding);
+    out.min_up_cosine = static_cast<float>(
+        portable::cos(gravity->max_angle * portable::kRadiansPerDegree) - kRounding);
   }
   if (prior.pose) {
     out.pose = true;
@@ -85,7 +84,8 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
       out.expected.t[row] = static_cast<float>(local.translation()[row]);
     }
     out.min_trace = static_cast<float>(
-        1.0 + 2.0 * portable::cos(prior.pose->max_rotation * kRadians) - kRounding);
+        1.0 + 2.0 * portable::cos(prior.pose->max_rotation * portable::kRadiansPerDegree) -
+        kRounding);
     out.max_squared_distance = static_cast<float>(prior.pose->max_translation *
                                                   prior.pose->max_translation * (1.0 + kRounding));
   }

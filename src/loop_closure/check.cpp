@@ -7,13 +7,12 @@
 #include <sstream>
 
 #include "gpureg/error.hpp"
-#include "math/exponential.hpp"
+#include "math/trigonometry.hpp"
 #include "pose_graph/validate.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
 
-constexpr double kRadians = 3.14159265358979323846 / 180;
 /// Rotations of single precision are orthonormal to this.
 constexpr double kOrthonormal = 1e-4;
 constexpr double kSymmetric = 1e-6;  ///< relative to the largest element
@@ -197,7 +196,8 @@ LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsom
   } else {
     const pose_graph::LoopNoiseOptions& noise = options.graph.loop_noise;
     Vector6d diagonal;
-    diagonal.head<3>().setConstant(1 / portable::square(noise.rotation * kRadians));
+    diagonal.head<3>().setConstant(1 /
+                                   portable::square(noise.rotation * portable::kRadiansPerDegree));
     diagonal.tail<3>().setConstant(1 / portable::square(noise.translation));
     mode.information = UnalignedMatrix6d(diagonal.asDiagonal());
   }

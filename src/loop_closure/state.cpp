@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "math/exponential.hpp"
+#include "math/trigonometry.hpp"
 #include "pose_graph/validate.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
 
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180;
 /// Rotations further from orthonormal are made so again.
 constexpr double kSavedOrthonormal = 1e-5;
 
@@ -55,13 +54,13 @@ Odometry modelled_odometry(FragmentId source, FragmentId target,
   edge.length = target_from_source.translation().norm();
   const double degrees =
       pose_graph::log_rotation(Eigen::Matrix3d(target_from_source.linear())).norm() /
-      kRadiansPerDegree;
+      portable::kRadiansPerDegree;
   const double translation =
       std::max(drift.min_translation, drift.translation_per_metre * edge.length);
   const double rotation = std::max(drift.min_rotation, drift.rotation_per_metre * edge.length +
                                                            drift.rotation_per_degree * degrees);
   Vector6d information;
-  information.head<3>().setConstant(1 / portable::square(rotation * kRadiansPerDegree));
+  information.head<3>().setConstant(1 / portable::square(rotation * portable::kRadiansPerDegree));
   information.tail<3>().setConstant(1 / portable::square(translation));
   edge.information = UnalignedMatrix6d(information.asDiagonal());
   return edge;

@@ -6,13 +6,12 @@
 #include <numeric>
 #include <tuple>
 
-#include "math/exponential.hpp"
+#include "math/trigonometry.hpp"
 #include "pose_graph/components.hpp"
 
 namespace gpureg::pose_graph {
 namespace {
 
-constexpr double kRadians = 3.14159265358979323846 / 180.0;
 /// Confidences of exactly 0 or 1 count as this far from them, so that their log odds are finite; no
 /// registration knows its error rate better.
 constexpr double kLeastDoubt = 1e-6;
@@ -30,7 +29,7 @@ double log_odds(double confidence) {
 
 Matrix6d diagonal_information(double rotation_degrees, double translation) {
   Vector6d d;
-  d.head<3>().setConstant(1 / portable::square(rotation_degrees * kRadians));
+  d.head<3>().setConstant(1 / portable::square(rotation_degrees * portable::kRadiansPerDegree));
   d.tail<3>().setConstant(1 / portable::square(translation));
   return d.asDiagonal();
 }
@@ -87,7 +86,7 @@ void sort_edges(Problem& problem) {
 
 Matrix6d odometry_information(const Pose& motion, const DriftOptions& drift) {
   const double metres = motion.translation.norm();
-  const double degrees = log_rotation(motion.rotation).norm() / kRadians;
+  const double degrees = log_rotation(motion.rotation).norm() / portable::kRadiansPerDegree;
   return diagonal_information(
       std::max(drift.min_rotation,
                drift.rotation_per_metre * metres + drift.rotation_per_degree * degrees),
@@ -145,8 +144,9 @@ Problem compile(const Graph& graph, const Options& options) {
   sort_edges(out);
   for (const GravityFactor& factor : graph.gravity) {
     const Eigen::Vector3d up = factor.up;
-    out.gravity.push_back({position(factor.node), up.normalized(),
-                           1 / portable::square(factor.sigma_degrees * kRadians)});
+    out.gravity.push_back(
+        {position(factor.node), up.normalized(),
+         1 / portable::square(factor.sigma_degrees * portable::kRadiansPerDegree)});
   }
   for (const PoseFactor& factor : graph.priors)
     out.priors.push_back({position(factor.node), to_pose(factor.world_from_node).inverse(),

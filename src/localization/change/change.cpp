@@ -11,13 +11,13 @@
 #include "localization/change/changed_points.hpp"
 #include "localization/check_scan.hpp"
 #include "localization/surface.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg::localization {
 namespace {
 
 /// Distance from the points of the scan up to which the map takes part in the refinement, voxels.
 constexpr double kNeighborhoodVoxels = 20;
-constexpr double kRadiansPerDegree = 0.017453292519943295;
 
 /// A scan and the map around it, in one frame: that of the map, less `middle`.
 struct Scene {
@@ -148,8 +148,8 @@ std::vector<float> tolerances(const std::vector<Eigen::Vector3f>& points,
                               const Eigen::Vector3f& pivot, const ChangeOptions& options) {
   std::vector<float> out;
   for (const Eigen::Vector3f& p : points) {
-    const double arm =
-        static_cast<double>((p - pivot).norm()) * options.rotation_sigma * kRadiansPerDegree;
+    const double arm = static_cast<double>((p - pivot).norm()) * options.rotation_sigma *
+                       portable::kRadiansPerDegree;
     const double sigma =
         std::sqrt(options.translation_sigma * options.translation_sigma + arm * arm);
     out.push_back(static_cast<float>(options.tolerance + 2 * sigma));

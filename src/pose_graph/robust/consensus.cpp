@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "math/exponential.hpp"
+#include "math/trigonometry.hpp"
 #include "pose_graph/components.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/uncertain_pose.hpp"
@@ -87,8 +87,8 @@ class Cycles {
       std::nth_element(lengths.begin(), high, lengths.end());
       reach = std::max(1e-3, 2 * *high);
     }
-    constexpr double pi = 3.14159265358979323846;
-    log_volume_ = portable::log(8 * pi * pi) + portable::log(4.0 / 3 * pi * reach * reach * reach);
+    log_volume_ = portable::log(8 * portable::kPi * portable::kPi) +
+                  portable::log(4.0 / 3 * portable::kPi * reach * reach * reach);
   }
 
   const std::vector<Candidate>& candidates() const { return candidates_; }
